@@ -238,7 +238,7 @@ MUTATIONS = [
     ("engines/colony/timetable.py", "tick > colony.ticks", "tick > colony.ticks + 1", PROTOCOL),
     ("engines/colony/timetable.py", "~(done & event.once)", "~done", PROTOCOL),
     ("engines/colony/timetable.py", "        done |= worlds", "        done &= worlds", PROTOCOL),
-    ("engines/colony/interventions.py", "(nest)) + 0.5)", "(nest)))", PROTOCOL),
+    ("engines/colony/interventions.py", "nest)) + 0.5)", "nest)))", PROTOCOL),
     ("engines/colony/interventions.py", "max(episode, 0))", "0)", PROTOCOL),
     ("engines/colony/state.py", "        self._undo_interventions(which)\n", "", PROTOCOL),
     ("protocol.py", "range(self.interval, length", "range(0, length", PROTOCOL),

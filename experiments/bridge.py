@@ -23,8 +23,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from colony import LEARNING, scheduled
 
     from taichi_ants import AntsError, Colony, Life, Task, files
-    from taichi_ants.analysis import style
     from taichi_ants.engines.colony.interventions import Interventions
+    from taichi_ants.interventions import Clear, Place
     from taichi_ants.studies import command_line
     from taichi_ants.studies.command import run_study
     from taichi_ants.studies.command_line import whole_number
@@ -32,9 +32,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.points import ColonyPoint
     from taichi_ants.studies.study import Study
     from taichi_ants.task import foraging, queueing
-    from taichi_ants.task.constants import EMPTY, OBSTACLE
     from taichi_ants.worlds import double_bridge
-    from taichi_ants.worlds.double_bridge import ROOM_RADIUS, branch_cells, junction_cells
+    from taichi_ants.worlds.double_bridge import ROOM_RADIUS, bridge_paths
 
 VERSION = 1  # of the arrays that are kept of each run
 REACH = 50  # number of ticks for which an ant lays a trail
@@ -149,9 +148,8 @@ def tables(plan: Plan, results: Results) -> str:
     files.write_csv(results.folder / "shares.csv", table, list(table[0]))
     if results.figures:
         folder = files.check_writable_folder(results.folder / "figures")
-        with style.all_or_none(folder):
-            shown.draw(folder / "bridge.png", found, plan.ticks)
-            shown.draw_late(folder / "late.png", found, plan.ticks)
+        shown.draw(folder / "bridge.png", found, plan.ticks)
+        shown.draw_late(folder / "late.png", found, plan.ticks)
     return shown.report(found, plan.ticks)
 
 
@@ -168,10 +166,10 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
         int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.
     """
     # The room or branch of each cell; a junction belongs to its room.
-    grid, junctions = double_bridge(**bridge).grid, junction_cells(**bridge)
+    grid, (junctions, branches) = double_bridge(**bridge).grid, bridge_paths(**bridge)
     pile = grid.distances(tuple((junctions[1] + junctions[0]).tolist()))
     zone = np.where(pile <= ROOM_RADIUS + 1, _FOOD_ROOM, _QUEEN_ROOM)
-    for number, cells in zip((_SHORT, _LONG), branch_cells(**bridge), strict=True):
+    for number, cells in zip((_SHORT, _LONG), branches, strict=True):
         zone[grid.index(cells)] = number
     n_worlds = len(colony.seeds)
     world = np.repeat(np.arange(n_worlds), colony.capacity)
@@ -179,11 +177,11 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
     room, branch = np.full(len(world), _QUEEN_ROOM), np.full(len(world), _SHORT)
     colony.begin_episode(ticks)
     if opens:
-        short, interventions = colony.grid.index(branch_cells(**bridge)[0]), Interventions(colony)
-        interventions.put(short, OBSTACLE)
+        short, interventions = colony.grid.index(branches[0]).tolist(), Interventions(colony)
+        interventions.apply(Place("rock", short))
     while colony.ticks < ticks:
         if opens and colony.ticks == opens:
-            interventions.put(short, EMPTY)
+            interventions.apply(Clear(short))
         window = colony.ticks * WINDOWS // ticks
         until = opens if colony.ticks < opens else ticks
         colony.tick(min(_LOOK_EVERY, until - colony.ticks))

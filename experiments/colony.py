@@ -44,7 +44,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.analysis.bounds.limits import limits_of
     from taichi_ants.analysis.drawings import drawings
     from taichi_ants.analysis.findings import seeds_in_words
-    from taichi_ants.analysis.tables import markdown, plain_text, sentence
+    from taichi_ants.analysis.tables import plain_text, sentence
     from taichi_ants.errors import count
     from taichi_ants.learners.policies import save_policy
     from taichi_ants.measures.finished import COLONY, Run, values_of
@@ -322,7 +322,6 @@ def tables(plan: Plan, runs: Runs) -> str:
         ("differences.csv", study.difference_rows(results.judged)),
     ):
         files.write_csv(folder / name, table, list(table[0]))
-    files.write_text(folder / "findings.md", markdown(study.found(*results)))
     policies = {}
     for condition, point in conditions.items():
         if condition.rules in COMPARED and condition.regime == JOINT:
@@ -341,10 +340,9 @@ def tables(plan: Plan, runs: Runs) -> str:
             save_policy(path, q_values[run], metadata, point.task.observation)
     parts: dict[str, Any] = {"drawings": [], "players": []}
     if runs.figures:
-        with style.all_or_none(folder / "figures"):
-            style.save_all(draw_all(results.rows), folder / "figures")
-            parts["drawings"] = drawings(draw_all(results.rows))
-            parts["players"] = at_work(conditions, policies, seeds[0])
+        style.save_all(draw_all(results.rows), folder / "figures")
+        parts["drawings"] = drawings(draw_all(results.rows))
+        parts["players"] = at_work(conditions, policies, seeds[0])
     facts = page.setting_facts(settings_of(runs.study.points, seeds))
     parts["facts"] = {**facts, **page.made_facts(runs.made)}
     links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]

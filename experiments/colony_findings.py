@@ -376,66 +376,8 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
 
 def of_largest(findings: Mapping[Sizes, Finding]) -> Finding:
     """Return the finding on the largest colony; of several, that with the strongest objection."""
-    return _of_size(findings, max(ants for ants, _ in findings))
-
-
-def _of_size(findings: Mapping[Sizes, Finding], n: int) -> Finding:
-    return weakest([one for (ants, _), one in findings.items() if ants == n])
-
-
-_SHOWN = (Verdict.SUPPORTED, Verdict.CONTRADICTED, Verdict.UNDECIDED)
-_HEADERS = ("World", "Statement", *(f"{sentence(one)}\nwith" for one in _SHOWN), "Clearest")
-
-
-def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
-    """Return the findings: a table per question, with a line per series and kind of world."""
-    blocks: list[Block] = []
-    by_condition = {one.condition: one for one in rows}
-    for question in QUESTIONS:
-        lines, units, shown = [], [], ""
-        for (world_kind, series), findings in judged.items():
-            if series.question == question:
-                world = "" if world_kind == shown else sentence(WORLDS[world_kind])
-                verdicts = _verdicts(by_condition, world_kind, series, findings)
-                lines.append([world, sentence(series.statement), *verdicts])
-                units.append(COLONY[series.measure].label)
-                shown = world_kind
-        what = f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says"
-        notes = [f"{what}; {_basis(rows)}."]
-        if lines:
-            blocks.append(Table(question, _HEADERS, lines, notes, text_columns=len(_HEADERS)))
-    return [
-        *blocks,
-        "Columns with verdicts list numbers of ants. If a colony is compared with each smaller "
-        "one, the strongest objection counts. The intervals of one question in one kind of world "
-        "hold at once with 95 %.",
-    ]
-
-
-def _verdicts(
-    by_condition: Mapping[Condition, ConditionRow],
-    world_kind: str,
-    series: Series,
-    findings: Mapping[Sizes, Finding],
-) -> list[str]:
-    """Return cells with the numbers of ants by verdict, and with the two means that differ most."""
-    by_verdict: dict[Verdict, list[int]] = {verdict: [] for verdict in Verdict}
-    for n in {n for n, _ in findings}:
-        by_verdict[_of_size(findings, n).verdict].append(n)
-    by_verdict[Verdict.UNDECIDED] += by_verdict[Verdict.EQUIVALENT]
-    cells = [", ".join(map(str, sorted(by_verdict[one]))) or MISSING for one in _SHOWN]
-    means = {sizes: _compared(by_condition, world_kind, series, sizes) for sizes in findings}
-
-    def distance(sizes: Sizes) -> float:
-        one, other = means[sizes]
-        return abs(one - other) / (abs(one) + abs(other) or 1.0)
-
-    n, less = max(findings, key=distance)
-    one, other = means[n, less]
-    example = f"{n}: {figure(one)} against {figure(other)}"
-    example += "" if less == n else f" with {less}"
-    example += f" ({100 * (one / other - 1):+.0f} %)" if min(one, other) > 0 else ""
-    return [*cells, example]
+    largest = max(ants for ants, _ in findings)
+    return weakest([one for (ants, _), one in findings.items() if ants == largest])
 
 
 class Results(NamedTuple):

@@ -23,18 +23,17 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import Any
 
     import numpy as np
+    from paper import baselines as bounds
     from paper import figures, page, process
-    from paper.claims import Audit, assess, claims_markdown, claims_rows
+    from paper.baselines import Baseline
+    from paper.claims import Audit, assess, claims_rows
     from paper.comparison import PAPER_WORLD, Comparison, Row
     from paper.page import Example, Seen
-    from paper.report import report, table2_markdown
+    from paper.report import report
     from paper.table2 import Line, example_name, examples, summarise, summarise_behaviours, table2
 
     from taichi_ants import AntsError, Task, TrainingConfig, World, files, learners, train, worlds
-    from taichi_ants.analysis import style
     from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
-    from taichi_ants.analysis.bounds import baselines as bounds
-    from taichi_ants.analysis.bounds.baselines import Baseline
     from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
     from taichi_ants.engines.runs.training import evaluate
     from taichi_ants.files import archives
@@ -235,9 +234,7 @@ def tables(plan: Plan, results: Results) -> str:
 
     lines, audit = write_tables(folder, comparison, baselines)
     save_policies(folder / "policies", comparison, chosen)
-    shown = Seen()
-    with style.all_or_none(folder / "figures", folder / "renders"):
-        shown = seen()
+    shown = seen()
     facts = {"World": comparison.world, **setting_facts(settings_of(study.points, study.seeds))}
     links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
     facts |= made_facts(results.made)
@@ -278,8 +275,6 @@ def write_tables(
         "baselines": [one._asdict() for one in baselines],
     }.items():
         files.write_csv(folder / f"{name}.csv", rows, list(rows[0]))
-    files.write_text(folder / "table2.md", table2_markdown(comparison, lines))
-    files.write_text(folder / "claims.md", claims_markdown(audit, comparison.world))
     of_runs = {name: getattr(comparison, name) for name in ("behaviours", "policy_returns")}
     curves = {f"curve_{name}": curve for name, curve in comparison.curves.items()}
     archives.write(folder / "runs.npz", {**comparison.measures, **of_runs, **curves})

@@ -200,7 +200,7 @@ def run(seeds: list[int], after: int = 0, keep: bool = False) -> Course:
         drawn = tick - 1 - course.wall
         for world in np.flatnonzero((drawn >= 0) & (drawn < STROKE)).tolist():
             if cells := parts[drawn[world]]:
-                Place("rock", cells).apply(Interventions(colony, [world]))
+                Interventions(colony, [world]).apply(Place("rock", cells))
         colony.tick()
         picked[colony.events == Event.PICKED_UP] = tick
         delivers = colony.events == Event.DELIVERED

@@ -1,8 +1,8 @@
 """Render an ant before and after learning, side by side.
 
 Without --seed, the script trains many ants, each alone with its own seed, and shows the one that is
-closest to the median at all --checkpoints. The extension of --out selects the file type: .gif,
-.mp4, or none for a folder of PNG pictures. See docs/rendering.md.
+closest to the median at all --checkpoints. The extension of --out selects the file type: .gif or
+.mp4. See docs/rendering.md.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from numbers import Real
 
 import numpy as np
@@ -24,13 +24,13 @@ from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.worlds.world import STARTS, World
 
 MAX_ANTS = 1 << 24
-_ALONE = "a run of one ant", LONE, "leave it out, or use a Colony"
+ALONE = "a run of one ant", LONE, "leave it out, or use a Colony"
 
 
 def checked_world(
     world: World,
     learns: bool = False,
-    what: str = _ALONE[0],
+    what: str = ALONE[0],
     supports: Collection[str] = LONE,
 ) -> World:
     """Return the world; AntsError unless `what` supports it and, with `learns`, it has food."""
@@ -58,9 +58,13 @@ def checked_task(
     return task
 
 
-def checked_lone_task(task: Task | None) -> Task:
-    """Return the task of a run of one ant, by default the paper's."""
-    return checked_task(task, *_ALONE)
+def checked_run(
+    world: World, task: Task | None, max_steps: int, learns: bool = False
+) -> tuple[Task, int]:
+    """Return the task, by default the paper's, and the step limit of runs of one ant."""
+    task = checked_task(task, *ALONE)
+    checked_world(world, learns)
+    return task, checked_max_steps(max_steps, task)
 
 
 def checked_capacity(
@@ -149,9 +153,3 @@ def checked_share(name: str, value: float) -> float:
     if not isinstance(value, Real) or isinstance(value, bool) or not 0 <= value <= 1:
         raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and 1.")
     return float(value)
-
-
-def check_progress(progress: object) -> None:
-    """Raise AntsError unless `progress` is None or a function."""
-    if progress is not None:
-        expect("progress", progress, Callable)  # type: ignore[arg-type]

@@ -203,4 +203,4 @@ def expect(name: str, value: object, *kinds: type) -> None:
 
 _PLAIN = {"str": "text", "NoneType": "None", "ndarray": "an array", "PathLike": "a path"}
 _PLAIN |= {"Mapping": "a mapping of names to values"}
-_PLAIN |= {"Callable": "a function", "Tidy": "a result of Colony.run, train or evaluate"}
+_PLAIN |= {"Tidy": "a result of Colony.run, train or evaluate"}

@@ -1,7 +1,7 @@
 """Interventions: all that can be changed in a colony between two ticks.
 
-Each intervention is a record of settings with a method `apply`. Sweep files, protocols, the live
-page and its session files use the same names and settings:
+Each intervention is a record of settings; `Interventions.apply` makes it. Sweep files, protocols,
+the live page and its session files use the same names and settings:
 
     interventions.from_dict({"remove_ants": {"share": 0.5}}) == RemoveAnts(share=0.5)
 
@@ -37,7 +37,6 @@ from taichi_ants.settings import (
     settings_of_entry,
 )
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 from taichi_ants.task.field import TRAIL
 from taichi_ants.task.model import Model
 from taichi_ants.task.pheromone import MAX_DEPOSIT
@@ -47,14 +46,18 @@ if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
 
 One = TypeVar("One", bound="ShorthandSettings")
-_GROUNDS = {"rock": OBSTACLE, "food": FOOD}
 _MOST = 2**24  # ants, see `arguments.MAX_ANTS`
 _CELLS = Setting("cells, each [x, y, z], or the name of a region", or_region=True)
 _NAMED = {group.name: group for group in named_groups(Task)}
 
 
 class ShorthandSettings(Settings):
-    """Settings that a mapping or, for some classes, a single value can stand for."""
+    """Settings that a mapping or, for some classes, a single value can stand for.
+
+    `short_for` are the names of the settings that such a value can be, tried in this order.
+    """
+
+    short_for: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def from_dict(cls: type[One], facts: Any) -> One:
@@ -69,7 +72,7 @@ class ShorthandSettings(Settings):
         """Return the record that a mapping or a short form stands for; else the value itself."""
         if isinstance(value, cls):
             return value
-        values = value if isinstance(value, Mapping) else cls.short(value)
+        values = value if isinstance(value, Mapping) else cls._short(value)
         if values is None:
             return value
         for setting in declared(cls):
@@ -78,16 +81,28 @@ class ShorthandSettings(Settings):
         return cls(**values)
 
     @classmethod
-    def short(cls, value: Any) -> dict[str, Any] | None:
+    def _short(cls, value: Any) -> dict[str, Any] | None:
         """Return the settings that a single value stands for; None if it is not allowed."""
-        return None
+        is_whole = isinstance(value, (int, np.integer)) and not is_flag(value)
+        cells = value if isinstance(value, str) else entries_of(value)
+        short = {"number": value, "level": value} if is_whole else {}
+        short |= {"share": value} if isinstance(value, float) else {}
+        short |= {"value": value} | ({} if cells is None else {"cells": cells})
+        name = next((name for name in cls.short_for if name in short), None)
+        return None if name is None else {name: short[name]}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the settings that differ from their defaults, JSON-compatible."""
-        values = {setting.name: getattr(self, setting.name) for setting in declared(type(self))}
-        defaults = {setting.name: setting.default for setting in declared(type(self))}
-        values = {name: value for name, value in values.items() if value != defaults[name]}
-        return {name: _plain(value) for name, value in values.items()}
+        values = {setting: getattr(self, setting.name) for setting in declared(type(self))}
+        return {
+            setting.name: _plain(value)
+            for setting, value in values.items()
+            if value != setting.default
+        }
+
+    def facts(self) -> dict[str, Any]:
+        """Return the name and the settings, JSON-compatible."""
+        return {self.path: self.as_dict()}
 
 
 def _plain(value: Any) -> Any:
@@ -98,14 +113,19 @@ def _plain(value: Any) -> Any:
 
 
 class Intervention(ShorthandSettings):
-    """A change of a colony between two ticks; the path of the class is its name."""
+    """A change of a colony between two ticks; the path of the class is its name.
+
+    `Interventions.apply` makes it. `in_all_worlds` says whether worlds of a colony share what it
+    changes.
+    """
 
     form = "a table of settings"
-    in_all_worlds: ClassVar[bool] = False  # because the worlds of a colony share what it changes
+    in_all_worlds: ClassVar[bool] = False
 
-    def facts(self) -> dict[str, Any]:
-        """Return the name and the settings, JSON-compatible; see `from_dict`."""
-        return {self.path: self.as_dict()}
+    def check(self) -> None:
+        super().check()
+        if not isinstance(cells := getattr(self, "cells", None), str | None):
+            object.__setattr__(self, "cells", _checked_cells(f"{self.path}.cells", cells))
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         """Raise an AntsError if the change is impossible in worlds like this one, with this task.
@@ -123,62 +143,39 @@ class Intervention(ShorthandSettings):
                 "numbered from 0; choose one of them."
             )
 
-    def apply(self, to: Any) -> None:
-        """Apply the change to an `Interventions`; AntsError if a world does not allow it."""
-        raise NotImplementedError
-
-
-class OfCells(Intervention):
-    """An intervention on some cells, of which a list is the short form."""
-
-    form = "a list of cells, the name of a region, or a table of settings"
-
-    def check(self) -> None:
-        super().check()
-        if not isinstance(getattr(self, "cells", None), str | None):
-            object.__setattr__(self, "cells", _checked_cells(f"{self.path}.cells", self.cells))  # type: ignore[attr-defined]
-
     def _check_count(self, n: int, form: str) -> None:
         """Raise AntsError unless there are n cells; `form` says which."""
         cells: Any = self.cells  # type: ignore[attr-defined]
         if isinstance(cells, str) or len(cells) != n:
             raise AntsError(f"`{self.path}.cells` is {shown(cells)}; give {form}.")
 
-    @classmethod
-    def short(cls, value: Any) -> dict[str, Any] | None:
-        cells = value if isinstance(value, str) else entries_of(value)
-        return None if cells is None else {"cells": cells}
+
+class _OfCells(Intervention):
+    form = "a list of cells, the name of a region, or a table of settings"
+    short_for = ("cells",)
 
 
-class OfAnts(OfCells):
+class _OfAnts(Intervention):
     """An intervention on a number of ants, a share of the living ants, or the ants on cells."""
 
     form = (
         "a number of ants, a share such as 0.5, a list of cells, the name of a region, or a table "
         "of settings"
     )
-    number: int | None
-    share: float | None
-    cells: Sequence | None
+    short_for = ("number", "share", "cells")
 
     def check(self) -> None:
         super().check()
-        ways = [name for name in ("number", "share", "cells") if getattr(self, name) is not None]
+        ways = [name for name in self.short_for if getattr(self, name) is not None]
         if len(ways) != 1:
             raise AntsError(
                 f"`{self.path}` has {' and '.join(ways) or 'neither number, share nor cells'}; "
                 "give one of number, share and cells."
             )
 
-    @classmethod
-    def short(cls, value: Any) -> dict[str, Any] | None:
-        if isinstance(value, (int, np.integer)) and not is_flag(value):
-            return {"number": value}
-        return {"share": value} if isinstance(value, float) else super().short(value)
-
 
 @dataclass(frozen=True)
-class RemoveAnts(OfAnts, path="remove_ants"):
+class RemoveAnts(_OfAnts, path="remove_ants"):
     """Remove ants with the food that they carry: random ants, or those on cells; or of one nest.
 
     A share is rounded to a number of ants, halves up.
@@ -189,15 +186,9 @@ class RemoveAnts(OfAnts, path="remove_ants"):
     cells: Annotated[Sequence | None, _CELLS] = None
     nest: Annotated[int | None, Setting("nest of the ants; any if left out", least=0)] = None
 
-    def apply(self, to: Any) -> None:
-        if self.cells is None:
-            to.remove_some(self.number, self.share, self.nest)
-        else:
-            to.remove_ants(to.index(self.cells), self.nest)
-
 
 @dataclass(frozen=True)
-class AddAnts(OfAnts, path="add_ants"):
+class AddAnts(_OfAnts, path="add_ants"):
     """Add ants on the cells on which further ants would start, or on those of the cells given
     that are empty.
 
@@ -214,15 +205,9 @@ class AddAnts(OfAnts, path="add_ants"):
     ] = None
     nest: Annotated[int | None, Setting("nest of the new ants", least=0)] = None
 
-    def apply(self, to: Any) -> None:
-        if self.cells is None:
-            to.add_some(self.number, self.share, self.heading, self.nest)
-        else:
-            to.add_ants(to.index(self.cells), self.heading, self.nest)
-
 
 @dataclass(frozen=True)
-class Place(OfCells, path="place"):
+class Place(_OfCells, path="place"):
     """Place rock or food on cells, or the queen on one cell; ants there move aside.
 
     Rock and food leave out the cells of queens, and cells whose ant has no room nearby.
@@ -252,18 +237,9 @@ class Place(OfCells, path="place"):
         if self.kind is not None:
             check_one_of("`place.kind`", self.kind, tuple(task.foods))
 
-    def apply(self, to: Any) -> None:
-        cells = to.index(self.cells)
-        if self.what == "queen":
-            to.move_queen(int(cells[0]), self.nest or 0)
-        else:
-            self.check_in(to.colony.worlds[0], to.colony.task, to.colony.learns)
-            kind = list(to.colony.task.foods).index(self.kind) if self.kind else 0
-            to.put(cells, _GROUNDS[self.what], kind)
-
 
 @dataclass(frozen=True)
-class Move(OfCells, path="move"):
+class Move(_OfCells, path="move"):
     """Move rock, food or the queen to an empty cell; an ant there moves aside.
 
     Has no effect if there is nothing to move, or the new cell is not free.
@@ -275,26 +251,20 @@ class Move(OfCells, path="move"):
         super().check()
         self._check_count(2, "the cell to move from, then the cell to move to")
 
-    def apply(self, to: Any) -> None:
-        cell, target = (int(to.index([cell])[0]) for cell in self.cells)
-        to.move(cell, target)
-
 
 @dataclass(frozen=True)
-class Clear(OfCells, path="clear"):
+class Clear(_OfCells, path="clear"):
     """Remove rock and food from cells."""
 
     cells: Annotated[Sequence, _CELLS]
 
-    def apply(self, to: Any) -> None:
-        to.put(to.index(self.cells), EMPTY)
-
 
 @dataclass(frozen=True)
-class SetTrail(OfCells, path="trail"):
+class SetTrail(Intervention, path="trail"):
     """Set the trail, or a further field, of cells without rock; level 0 clears it."""
 
     form = "a level, which is a whole number, or a table of settings"
+    short_for = ("level",)
 
     level: Annotated[int, Setting("trail level", least=0, most=MAX_DEPOSIT)]
     cells: Annotated[
@@ -302,18 +272,9 @@ class SetTrail(OfCells, path="trail"):
     ] = None
     field: Annotated[str, Setting("name of the field")] = TRAIL
 
-    @classmethod
-    def short(cls, value: Any) -> dict[str, Any] | None:
-        return {"level": value} if isinstance(value, (int, np.integer)) else None
-
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
         check_one_of("`trail.field`", self.field, (TRAIL, *task.fields))
-
-    def apply(self, to: Any) -> None:
-        self.check_in(to.colony.worlds[0], to.colony.task, to.colony.learns)
-        cells = to.everywhere() if self.cells is None else to.index(self.cells)
-        to.lay_trail(cells, self.level, self.field)
 
 
 @dataclass(frozen=True)
@@ -321,15 +282,9 @@ class SetAnts(Intervention, path="ants"):
     """Set the number of living ants; ants with the highest numbers are removed first."""
 
     form = "a whole number of ants, or a table of settings"
+    short_for = ("number",)
 
     number: Annotated[int, Setting("number of ants", least=1, most=_MOST)]
-
-    @classmethod
-    def short(cls, value: Any) -> dict[str, Any] | None:
-        return {"number": value} if isinstance(value, (int, np.integer)) else None
-
-    def apply(self, to: Any) -> None:
-        to.set_ants(self.number)
 
 
 @dataclass(frozen=True)
@@ -343,22 +298,18 @@ class SetTask(Intervention, path="task"):
     in_all_worlds = True
 
     def check(self) -> None:
-        known = {setting.path.removeprefix("task."): setting for setting in all_of(Task)}
         if not self.values:
             raise AntsError("`task` has no settings; name at least one, with its new value.")
         values = []
         for name, value in self.values:
-            group, _, rest = name.partition(".")
-            of = rest.partition(".")[0]
-            settings = known
-            if rest and group in _NAMED:
-                of_entry = settings_of_entry(_NAMED[group], of)
-                settings = {
-                    path.removeprefix("task."): setting for path, setting in of_entry.items()
-                }
-            if name not in settings:
-                raise AntsError(f"`task.{name}` {not_a_setting(name, settings)}")
-            values.append((name, settings[name].checked(value)))
+            group, entry, *_ = [*name.split("."), "", ""]
+            settings = {setting.path: setting for setting in all_of(Task)}
+            if entry and group in _NAMED:
+                settings = settings_of_entry(_NAMED[group], entry)
+            if (setting := settings.get(f"task.{name}")) is None:
+                known = [path.removeprefix("task.") for path in settings]
+                raise AntsError(f"`task.{name}` {not_a_setting(name, known)}")
+            values.append((name, setting.checked(value)))
         object.__setattr__(self, "values", tuple(sorted(values)))
 
     @classmethod
@@ -374,27 +325,34 @@ class SetTask(Intervention, path="task"):
     def changed(self, task: Task) -> Task:
         """Return the task with the new values; AntsError if they name a field it does not have."""
         for name, _ in self.values:
-            group, _, rest = name.partition(".")
-            known, of = getattr(task, group), rest.partition(".")[0]
-            if group in _NAMED and of not in known:
-                raise AntsError(f"`task.{name}` {not_a_setting(of, known, f'task.{group}')}")
+            group, entry, *_ = [*name.split("."), "", ""]
+            if group in _NAMED and entry not in (known := getattr(task, group)):
+                raise AntsError(f"`task.{name}` {not_a_setting(entry, known, f'task.{group}')}")
         return task.replace(**nested(dict(self.values)))
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
-        check_same_kernels(task, self.changed(task), learns)
-
-    def apply(self, to: Any) -> None:
-        to.set_task(self.changed(to.colony.task))
+        changed = self.changed(task)
+        castes = {name: caste.fixed for name, caste in task.castes.items()}
+        if castes != {name: caste.fixed for name, caste in changed.castes.items()}:
+            raise AntsError(
+                "the task cannot change the share, ants, nest or policy of a caste in an episode, "
+                "or whether it has thresholds; change its other numbers."
+            )
+        if Model(task, learns) != Model(changed, learns):
+            old, new = flat(task.as_dict()), flat(changed.as_dict())
+            names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
+            changes = (f"{name} from {old.get(name)!r} to {new.get(name)!r}" for name in names)
+            raise AntsError(
+                f"the task cannot change {' and '.join(changes)} in an episode, because that "
+                "requires other kernels; change settings that kernels read as numbers, for "
+                "example pheromone.level."
+            )
 
 
 class _Rate(Intervention):
     form = "a number"
-    value: float
+    short_for = ("value",)
     in_all_worlds = True
-
-    @classmethod
-    def short(cls, value: Any) -> dict[str, Any] | None:
-        return {"value": value}
 
 
 @dataclass(frozen=True)
@@ -402,9 +360,6 @@ class SetEpsilon(_Rate, path="epsilon"):
     """Set the exploration rate, which then does not decay."""
 
     value: Annotated[Share, Setting("exploration rate")]
-
-    def apply(self, to: Any) -> None:
-        to.set_epsilon(self.value)
 
 
 @dataclass(frozen=True)
@@ -414,10 +369,8 @@ class SetLearningRate(_Rate, path="learning_rate"):
     value: Annotated[Share, Setting("learning rate")]
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
-        check_learns(learns)
-
-    def apply(self, to: Any) -> None:
-        to.set_learning_rate(self.value)
+        if not learns:
+            raise AntsError("the ants do not learn, so they have no learning rate; leave it out.")
 
 
 @dataclass(frozen=True)
@@ -465,11 +418,13 @@ class SetPolicy(Intervention, path="policy"):
         return checked_values(table, task)
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
-        check_follows(learns, task)
+        if learns or not task.choice.needs_table:
+            raise AntsError(
+                f"the ants of this colony learn, are given actions, or choose without action "
+                f"values (`task.choice.rule` is {task.choice.rule!r}), so they follow no policy; "
+                'make a colony with sharing="frozen" and q_values.'
+            )
         self.table_for(task)
-
-    def apply(self, to: Any) -> None:
-        to.set_policy(self.table_for(to.colony.task))
 
 
 @dataclass(frozen=True)
@@ -477,9 +432,6 @@ class Episode(Intervention, path="episode"):
     """End the episode and begin the next one."""
 
     in_all_worlds = True
-
-    def apply(self, to: Any) -> None:
-        to.begin_episode()
 
 
 INTERVENTIONS: dict[str, type[Intervention]] = {
@@ -489,41 +441,6 @@ INTERVENTIONS: dict[str, type[Intervention]] = {
         *(SetTask, SetEpsilon, SetLearningRate, SetPolicy, Episode),
     )
 }
-
-
-def check_learns(learns: bool) -> None:
-    """Raise AntsError unless ants learn, so that they have a learning rate."""
-    if not learns:
-        raise AntsError("the ants do not learn, so they have no learning rate; leave it out.")
-
-
-def check_follows(learns: bool, task: Task) -> None:
-    """Raise AntsError unless ants follow a policy and do not learn."""
-    if learns or not task.choice.needs_table:
-        raise AntsError(
-            f"the ants of this colony learn, are given actions, or choose without action values "
-            f"(`task.choice.rule` is {task.choice.rule!r}), so they follow no policy; make a "
-            'colony with sharing="frozen" and q_values.'
-        )
-
-
-def check_same_kernels(task: Task, changed: Task, learns: bool) -> None:
-    """Raise AntsError if a changed task needs other kernels; `learns` says whether ants learn."""
-    castes = {name: caste.fixed for name, caste in task.castes.items()}
-    if castes != {name: caste.fixed for name, caste in changed.castes.items()}:
-        raise AntsError(
-            "the task cannot change the share, ants, nest or policy of a caste in an episode, or "
-            "whether it has thresholds; change its other numbers."
-        )
-    if Model(task, learns) != Model(changed, learns):
-        old, new = flat(task.as_dict()), flat(changed.as_dict())
-        names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
-        changes = (f"{name} from {old.get(name)!r} to {new.get(name)!r}" for name in names)
-        raise AntsError(
-            f"the task cannot change {' and '.join(changes)} in an episode, because that requires "
-            "other kernels; change settings that kernels read as numbers, for example "
-            "pheromone.level."
-        )
 
 
 def from_dict(facts: Any) -> Intervention:

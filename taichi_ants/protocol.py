@@ -11,12 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Annotated, Any
-
-import numpy as np
+from typing import Annotated, Any
 
 from taichi_ants import measures
-from taichi_ants.errors import AntsError, count, entries_of, shown
+from taichi_ants.errors import AntsError, entries_of, shown
 from taichi_ants.interventions import (
     AddAnts,
     Clear,
@@ -31,14 +29,9 @@ from taichi_ants.interventions import (
     SetTask,
     SetTrail,
     ShorthandSettings,
-    indices,
 )
 from taichi_ants.settings import Setting
-from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
-
-if TYPE_CHECKING:
-    from taichi_ants.worlds.world import World
 
 Tick = Annotated[int, Setting(unit="ticks of the episode", least=0, most=MAX_STEPS)]
 Interval = Annotated[int, Setting(unit="ticks", least=1, most=MAX_STEPS)]
@@ -61,7 +54,6 @@ class ProtocolEvent(ShorthandSettings):
     policy: Annotated[SetPolicy | None, Setting("policy to follow")] = None
 
     def check(self) -> None:
-        """Check all settings."""
         super().check()
         if not self.interventions:
             names = ", ".join(setting.name for setting in fields(ProtocolEvent))
@@ -77,10 +69,6 @@ class ProtocolEvent(ShorthandSettings):
     def in_all_worlds(self) -> bool:
         """Whether worlds of a colony share what an intervention changes."""
         return any(intervention.in_all_worlds for intervention in self.interventions)
-
-    def facts(self) -> dict[str, Any]:
-        """Return the kind of the event and its settings, JSON-compatible."""
-        return {self.path: self.as_dict()}
 
     def times(self, length: int) -> range:
         """Return the ticks of an episode at which the event can happen, after that many ticks.
@@ -130,7 +118,6 @@ class Every(ProtocolEvent, path="every"):
     ] = None
 
     def check(self) -> None:
-        """Check all settings."""
         super().check()
         if self.start is None:
             object.__setattr__(self, "start", self.ticks)
@@ -162,7 +149,6 @@ class When(ProtocolEvent, path="when"):
     once: Annotated[bool, Setting("let the event happen only once in an episode")] = True
 
     def check(self) -> None:
-        """Check all settings."""
         super().check()
         measures.get(self.measure).check_single_state("`when.measure`")
         if (self.above is None) == (self.below is None):
@@ -189,71 +175,6 @@ def checked_protocol(protocol: Any) -> tuple[ProtocolEvent, ...]:
     if events is None or not all(isinstance(event, ProtocolEvent) for event in events):
         raise AntsError(f"protocol is {shown(protocol)}; it must be a list of At, Every and When.")
     return tuple(events)
-
-
-def check_room(
-    event: ProtocolEvent,
-    of: Sequence[ProtocolEvent],
-    task: Task,
-    ants: int,
-    capacity: int,
-    length: int | None,
-) -> None:
-    """Raise AntsError if an event adds more ants than can ever have room in a colony.
-
-    `ants` start in each world, and `length` is that of episodes, None if they can end earlier. The
-    events of `of` that are certain to happen before add to these ants. If ants can die, or an event
-    in `of` can remove some, there may be room later.
-    """
-    lifespans = (task.life.lifespan, *(caste.lifespan for caste in task.castes.values()))
-    if any(lifespans) or any(other.remove_ants or other.ants for other in of):
-        return
-    number = added = _number_added(event)
-    if length is not None and not isinstance(event, When):
-        last = event.times(length)[-1]
-        added = sum(
-            _number_added(other) * len(range(times.start, min(times.stop, last + 1), times.step))
-            for other in of
-            if _number_added(other) and not isinstance(other, When)
-            for times in [other.times(length)]
-        )
-    if number and ants + added > capacity:
-        total = f", which makes {added} ants with those of earlier events" if added > number else ""
-        raise AntsError(
-            f"`add_ants.number` is {number}{total}, but the {count(ants, 'ant')} at the start "
-            f"leave room for {capacity - ants}, because the capacity is {capacity}; set a larger "
-            "capacity."
-        )
-
-
-def _number_added(event: ProtocolEvent) -> int:
-    return (event.add_ants and event.add_ants.number) or 0
-
-
-def check_queen(
-    event: ProtocolEvent, of: Sequence[ProtocolEvent], world: World, length: int
-) -> None:
-    """Raise AntsError if an event moves a queen to a cell that is certain not to be empty.
-
-    It has rock or a queen in the world, and no event in `of` can remove it. `length` is that of
-    episodes.
-    """
-    placed = event.place
-    if placed is None or placed.what != "queen":
-        return
-    if any(other.clear or other.move or other.place not in (None, placed) for other in of):
-        return
-    cell = indices(world.grid, placed.cells)
-    if np.isin(cell, world.grid.index(np.vstack([world.obstacles, world.queens]))):
-        raise AntsError(
-            f"`place.cells` has the cell {placed.cells[0]}, where the world has rock or a queen, "
-            "so the queen cannot move there; choose an empty cell."
-        )
-    if not isinstance(event, When) and len(event.times(length)) > 1:
-        raise AntsError(
-            f"`{event.path}` moves the queen more than once to the same cell, which is not empty "
-            "the second time; use `at`."
-        )
 
 
 def read(tables: Mapping[str, Sequence[Any]]) -> tuple[ProtocolEvent, ...]:

@@ -29,12 +29,6 @@ ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
 _LONGEST_LOCK = 60.0  # seconds
 
-# Files with the quota of CPU time and its period: in cgroups of version 2, and of version 1.
-_QUOTAS = (
-    ("/sys/fs/cgroup/cpu.max",),
-    ("/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "/sys/fs/cgroup/cpu/cpu.cfs_period_us"),
-)
-
 # A lock for environments in several threads, because Taichi compiles and launches for one thread.
 alone = threading.RLock()
 
@@ -47,22 +41,14 @@ class Runtime:
     threads: int
 
 
+@cache
 def available_threads() -> int:
     """Return the number of CPU threads that this process may use, within a container's quota."""
     n = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(n, _quota(_QUOTAS))
-
-
-@cache
-def _quota(places: tuple[tuple[str, ...], ...]) -> int:
-    """Return the number of processors that Linux grants to this container, at least 1."""
-    for files in places:
-        with contextlib.suppress(OSError, ValueError):
-            words = " ".join(Path(name).read_text() for name in files).split()
-            quota, period = map(float, words)
-            if quota > 0:
-                return max(1, math.ceil(quota / period))
-    return MAX_THREADS
+    with contextlib.suppress(OSError, ValueError):  # no file, or no quota
+        quota, period = map(float, Path("/sys/fs/cgroup/cpu.max").read_text().split())
+        n = min(n, max(1, math.ceil(quota / period)))
+    return n
 
 
 def start(threads: int | None = None, arch: str | None = None) -> Runtime:
@@ -110,18 +96,6 @@ def check_on_cpu(running: Runtime, what: str) -> None:
     """Raise AntsError if Taichi runs on a GPU, for kernels with too many arguments for one."""
     if running.arch != "cpu":
         raise AntsError(f"arch is {running.arch!r}, but {what} only on the CPU; use arch='cpu'.")
-
-
-def refresh() -> None:
-    """Save compiled kernels, and read those of other processes at the next start.
-
-    This ends a running Taichi, unless it holds data or the user has started it.
-    """
-    import taichi as ti
-
-    runtime = ti.lang.impl.get_runtime()
-    if runtime.prog is not None and getattr(runtime, "is_ours", False) and not holds_data():
-        ti.reset()
 
 
 def start_with_checks() -> None:
@@ -238,13 +212,12 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
         "cfg_optimization": False,  # takes half of the time to compile, and LLVM does it as well
         "default_fp": ti.f32,
         "default_ip": ti.i32,
-        "offline_cache_file_path": _in_utf8(str(cache_folder())),
+        "offline_cache_file_path": str(cache_folder()),
         **others,
     }
     arch = ti.cuda if wanted.arch == "cuda" else ti.cpu
     # These environment variables would change the settings, or make Taichi warn.
     names = [f"TI_{name.upper()}" for name in ("arch", "log_level", *settings)]
-    _in_utf8(os.environ.get("XDG_CACHE_HOME") or os.environ["HOME"])  # of Taichi's usual cache
     hidden = {name: os.environ.pop(name) for name in names if name in os.environ}
     with contextlib.redirect_stdout(io.StringIO()), Flushing():
         try:
@@ -255,16 +228,6 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
     if wanted.arch == "cuda" and ti.lang.impl.current_cfg().arch != ti.cuda:
         ti.reset()
         raise AntsError("arch is 'cuda', but no CUDA device is usable here; choose 'cpu'.")
-
-
-def _in_utf8(folder: str) -> str:
-    """Return the folder; AntsError if Taichi cannot read its name."""
-    if os.fsencode(folder).decode(errors="replace") != folder:
-        raise AntsError(
-            f"the folder {folder!r} for kernels has a name that is not UTF-8, which Taichi cannot "
-            "read; set XDG_CACHE_HOME or TI_OFFLINE_CACHE_FILE_PATH to another folder."
-        )
-    return folder
 
 
 def cache_folder() -> Path:

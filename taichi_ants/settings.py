@@ -27,7 +27,7 @@ import operator
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
-from functools import cache, partial, wraps
+from functools import cache, partial, reduce, wraps
 from inspect import signature
 from numbers import Real
 from types import NoneType, UnionType
@@ -79,17 +79,6 @@ class Setting:
     usual: Any = None
     choices: Callable[[], tuple[str, ...]] | None = None
     or_region: bool = False
-
-    def __post_init__(self) -> None:
-        if self.most is None:
-            return
-        for name, is_above in (("least", False), ("above", True)):
-            bound = getattr(self, name)
-            if bound is not None and (bound > self.most or (is_above and bound == self.most)):
-                raise AntsError(
-                    f"`Setting({name}={bound}, most={self.most})` allows no number; give a larger "
-                    f"`most` than `{name}`."
-                )
 
     def replace(self, other: Setting) -> Setting:
         """Return the combination of both; where `other` declares something, it takes precedence."""
@@ -202,9 +191,11 @@ class DeclaredSetting(NamedTuple):
             check_word(f"a name in `{self.path}`", name)
             try:
                 kind = entry.entry_named(name)  # type: ignore[attr-defined]
-                entries[name] = new if isinstance(new, kind) else _entry(kind, new, start, name)
+                if isinstance(new, Mapping) and name in start:
+                    new = start[name].replace(**new)
+                entries[name] = new if isinstance(new, kind) else kind.from_dict(new)
             except AntsError as error:
-                raise AntsError(_placed(str(error), entry, f"{self.path}.{name}")) from None
+                raise AntsError(str(error).replace(".NAME", f".{name}")) from None
         if len(entries) > (most := entry.most_entries):  # type: ignore[attr-defined]
             self._refuse(list(entries), f"{self.allowed}, at most {most}")
         return Named(entries)
@@ -256,38 +247,7 @@ class DeclaredSetting(NamedTuple):
         return "" if rule.most is None else f"at most {_plain(rule.most)}"
 
 
-class _Checked(type):
-    """The class of classes of settings, which refuses unknown names of settings.
-
-    An entry of a `Named` does not know its name, nor do groups of its settings. Until it gets one,
-    messages call them by their classes.
-    """
-
-    def __call__(cls, *values: Any, **named: Any) -> Any:
-        known = _arguments(cls)
-        path = cls.path  # type: ignore[attr-defined]
-        try:
-            for name in named:
-                if known is not None and name not in known:
-                    raise AntsError(f"`{_below(path, name)}` {not_a_setting(name, known)}")
-            return super().__call__(*values, **named)
-        except AntsError as error:
-            if _alone(cls) == path:
-                raise
-            text = str(error).replace(f"`{path}.", f"`{cls.__name__}.")
-            raise AntsError(_placed(text, cls, cls.__name__)) from None
-
-
-@cache
-def _arguments(cls: type) -> tuple[str, ...] | None:
-    """Return the names of the arguments of a class; None if it takes any name."""
-    parameters = signature(cls.__init__).parameters.values()  # type: ignore[misc]
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
-        return None
-    return tuple(parameter.name for parameter in parameters)[1:]
-
-
-class Settings(metaclass=_Checked):
+class Settings:
     """Base of the classes of settings, which are frozen dataclasses.
 
     `path` is the full name of the settings in sweep files and messages. If the class is a setting
@@ -303,8 +263,22 @@ class Settings(metaclass=_Checked):
         super().__init_subclass__(**more)
         cls.path = path or cls.path
 
+    def __new__(cls, /, *values: Any, **named: Any) -> Any:
+        known = cls.__dataclass_fields__  # type: ignore[attr-defined]
+        for name in named.keys() - known.keys():
+            raise AntsError(f"`{_below(cls.path, name)}` {not_a_setting(name, known)}")
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         self.check()
+        for fault in self.faults():
+            raise AntsError(fault)
+
+    def __repr__(self) -> str:
+        """Return the settings that differ from their defaults; for classes with `repr=False`."""
+        values = [(setting, getattr(self, setting.name)) for setting in declared(type(self))]
+        changed = [f"{s.name}={value!r}" for s, value in values if value != s.default]
+        return f"{type(self).__name__}({', '.join(changed)})"
 
     @classmethod
     def named(cls) -> Mapping[str, Any]:
@@ -329,6 +303,10 @@ class Settings(metaclass=_Checked):
             if setting.rule.only is not None:
                 self._fill_or_refuse(setting)
 
+    def faults(self) -> Iterator[str]:
+        """Yield messages about combinations of values that are not allowed."""
+        yield from ()
+
     def _fill_or_refuse(self, setting: DeclaredSetting) -> None:
         """Refuse a setting that has no effect; replace None by the usual value if it has one."""
         assert setting.rule.only is not None
@@ -350,41 +328,38 @@ class Settings(metaclass=_Checked):
         example `noise.slip`. If its values are words, it includes the value: `choice.rule=softmax`.
         A mapping of named settings is one feature.
         """
-        found: dict[str, str] = {}
-        for one in declared(type(self)):
-            value = getattr(self, one.name)
-            if value == one.default:
+        features: dict[str, str] = {}
+        for setting in declared(type(self)):
+            value = getattr(self, setting.name)
+            if value == setting.default:
                 continue
             if isinstance(value, Settings):
-                found |= {f"{one.name}.{name}": words for name, words in value.uses().items()}
+                of_group = value.uses().items()
+                features |= {f"{setting.name}.{name}": words for name, words in of_group}
             elif isinstance(value, Named):
-                found[one.name] = f"`{one.path}` has {', '.join(value)}"
+                features[setting.name] = f"`{setting.path}` has {', '.join(value)}"
             else:
-                word = f"={value}" if one.allowed_words else ""
-                found[one.name + word] = f"`{one.path}` is {shown(value)}"
-        return found
+                word = f"={value}" if setting.allowed_words else ""
+                features[setting.name + word] = f"`{setting.path}` is {shown(value)}"
+        return features
 
-    def replace(self: Self, **changes: Any) -> Self:
+    def replace(self: Self, /, **changes: Any) -> Self:
         """Return the settings with changes; settings that lose their effect get their defaults.
 
         To change a group, give a mapping of its settings; its entry "" is the value to start from.
         """
-        return self._changed(changes)
-
-    def _changed(self: Self, changes: Mapping[str, Any]) -> Self:
         known = {setting.name: setting for setting in declared(type(self))}
         changed: dict[str, Any] = {}
         for name, value in changes.items():
             if name not in known:
-                path = _below(_alone(type(self)), name)
-                raise AntsError(f"`{path}` {not_a_setting(name, known)}")
+                raise AntsError(f"`{_below(self.path, name)}` {not_a_setting(name, known)}")
             setting = known[name]
             if setting.kind is Named and isinstance(value, Mapping):
                 value = setting._named(value, getattr(self, name))
             elif setting.is_group and isinstance(value, Mapping):
                 inner = dict(value)
                 start = setting.checked(inner.pop("")) if "" in inner else getattr(self, name)
-                value = start._changed(inner)
+                value = start.replace(**inner)
             changed[name] = value
         for setting in known.values():
             if setting.rule.only and setting.name not in changed:
@@ -397,29 +372,8 @@ class Settings(metaclass=_Checked):
     def from_dict(cls: type[Self], facts: Any) -> Self:
         """Return the settings in a mapping, checked; groups are mappings or names."""
         if not isinstance(facts, Mapping):
-            raise AntsError(f"`{_alone(cls)}` is {shown(facts)}; it must be a table of settings.")
-        return cls()._changed(facts)
-
-
-def _entry(cls: Any, value: Any, start: Mapping[str, Any], name: str) -> Any:
-    """Return an entry of named settings, from a mapping of changes of the entry that exists."""
-    if not isinstance(value, Mapping):
-        return cls.from_dict(value)  # raises AntsError
-    return (start[name] if name in start else cls())._changed(value)
-
-
-def _alone(cls: Any) -> str:
-    """Return what messages call settings: the path, or the class of an entry without a name."""
-    return cls.__name__ if ".NAME" in cls.path else cls.path
-
-
-def _placed(text: str, cls: Any, path: str) -> str:
-    """Return a message that calls an entry and its groups by their classes, with their paths."""
-    for end in ".`":
-        text = text.replace(f"`{cls.__name__}{end}", f"`{path}{end}")
-    for setting in declared(cls):
-        text = _placed(text, setting.kind, f"{path}.{setting.name}") if setting.is_group else text
-    return text
+            raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
+        return cls().replace(**facts)
 
 
 Entry = TypeVar("Entry")
@@ -466,14 +420,14 @@ def settings_of_entry(group: DeclaredSetting, name: str) -> dict[str, DeclaredSe
     return {path: setting._replace(path=path) for path, setting in of_entry.items()}
 
 
-@cache
 def declared(cls: Any) -> tuple[DeclaredSetting, ...]:
     """Return the settings of a class or function: its fields or arguments with a `Setting`."""
-    return tuple(_read(cls))
+    return _read(cls)
 
 
-def _read(cls: Any) -> Iterator[DeclaredSetting]:
-    hints = get_type_hints(cls, include_extras=True)
+@cache
+def _read(cls: Any) -> tuple[DeclaredSetting, ...]:
+    settings, hints = [], get_type_hints(cls, include_extras=True)
     for name, default in _defaults(cls):
         hint = hints.get(name)
         if get_origin(hint) is Union:  # Python 3.10 makes arguments with the default None optional
@@ -481,13 +435,12 @@ def _read(cls: Any) -> Iterator[DeclaredSetting]:
         if get_origin(hint) is not Annotated:
             continue
         kind, *rules = get_args(hint)
-        rule = Setting()
-        for other in rules:
-            rule = rule.replace(other)
+        rule = reduce(Setting.replace, rules)
         entry = get_args(kind)[0] if get_origin(kind) is Named else NoneType
         kind, words, optional = _kind_of(kind)
         path = _below(getattr(cls, "path", "world"), name)  # functions build worlds
-        yield DeclaredSetting(name, path, kind, words, optional, default, rule, entry)
+        settings.append(DeclaredSetting(name, path, kind, words, optional, default, rule, entry))
+    return tuple(settings)
 
 
 def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:

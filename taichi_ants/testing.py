@@ -233,5 +233,5 @@ def _levels(
     """Return the levels of a pheromone in all cells: those of kernels, and of the reference."""
     cells = list(plain.world.ground)
     places = grid.index(np.array(cells, np.int64).reshape(-1, 3))
-    trail = plain.world.pheromone_named(name)
+    trail = plain.world.pheromones[name]
     return fields[name][places], np.array([trail.level(cell) for cell in cells])

@@ -20,7 +20,6 @@ from taichi_ants import (
     train,
 )
 from taichi_ants import worlds as places
-from taichi_ants.analysis import statistics
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import Policy
@@ -45,9 +44,6 @@ def colony() -> Colony:
 
 ODD = {
     "configs": lambda _: train(WORLD, SCALAR, 0, 1),
-    "progress": lambda _: train(WORLD, CONFIG, 0, 1, progress="x"),
-    "progress of rollouts": lambda _: evaluate(WORLD, TABLE, progress=np.zeros(0)),
-    "progress of a colony": lambda colony: colony.run(1, 1, progress=object()),
     "world": lambda _: Colony(SCALAR, None, CONFIG),
     "world of an episode": lambda colony: colony.begin_episode(world=SCALAR),
     "which": lambda colony: colony.reset_worlds(RAGGED),
@@ -61,10 +57,9 @@ ODD = {
     "a learner": lambda _: learners.get(LONG),
     "no learner": lambda _: learners.get(["sarsa"]),
     "no configuration": lambda _: learners.with_hyperparameters(None),
-    "a name of one's own": lambda _: learners.td_learner(LONG, print),
+    "a name of one's own": lambda _: learners.register(learners.td_learner(LONG, print)),
     "who is followed": lambda colony: record_colony(colony, follow=np.zeros(0)),
     "a state": lambda _: states.state_name(2**31),
-    "progress of a record": lambda _: record(WORLD, episodes=1, max_steps=2, progress=3),
     "a first value": lambda _: offline.fitted_q_iteration(data(), initial_q=None),
     "no first value": lambda _: offline.batch_q_learning(data(), initial_q=HUGE),
     "an offline model's": lambda _: offline.model_based(data(), TABLE, initial_q="x"),
@@ -74,9 +69,6 @@ ODD = {
     "a page's path": lambda _: check_page(None),
     "a frame": lambda _: frame(SCALAR),
     "what a notebook shows": lambda _: notebook(RAGGED),
-    "data of a model": lambda _: offline.EmpiricalModel.of(None, SCALAR),
-    "one dimension": lambda _: statistics.bootstrap_interval(np.arange(5.0)),
-    "one dimension of Student's": lambda _: statistics.student_interval(np.arange(5.0)),
     "numbers of worlds": lambda _: Interventions(
         Colony(WORLD, None, None, range(3), 2, sharing="frozen"), RAGGED
     ),
@@ -95,7 +87,6 @@ def test_what_is_odd_is_named(name: str, colony: Colony) -> None:
 
 def test_results_and_policies_are_taken_for_their_tables() -> None:
     result = train(WORLD, CONFIG, 5, 2)
-    assert "seed: 5 (one run; seeds=range(5) trains five runs)" in repr(result)
     table = result.q_values[0, 0]
     policy = Policy(table, "paper", {})
     for given in (result, policy):

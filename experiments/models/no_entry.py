@@ -12,6 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from taichi_ants import Colony, Field, Interventions, Pheromone, Task, World, rules
+from taichi_ants.interventions import SetTrail
 from taichi_ants.rules import pick, power
 from taichi_ants.settings import Setting
 from taichi_ants.studies import model_script
@@ -139,7 +140,7 @@ def deliveries_over_time(
     colony = Colony(worlds, rules_of_all, None, seeds, ants, sharing="frozen")
     colony.begin_episode()
     if model == PLACED:
-        Interventions(colony).lay_trail("wrong", AMOUNT, "no_entry")
+        Interventions(colony).apply(SetTrail(AMOUNT, "wrong", "no_entry"))
     counts = []
     for _ in range(0, TICKS, STEP):
         colony.tick(STEP)

@@ -25,7 +25,7 @@ def ants_over_time(seeds, share):
     colony.begin_episode()
     for tick in range(0, TICKS, STEP):
         if tick == REMOVAL:
-            RemoveAnts(share=share).apply(Interventions(colony))
+            Interventions(colony).apply(RemoveAnts(share=share))
         counts.append(colony.living.sum(axis=1))
         colony.tick(STEP)
     return np.transpose(counts)

@@ -11,7 +11,7 @@ from paper import quantities
 from paper.comparison import VARIANTS, Comparison
 from paper.quantities import Quantity, grids_of
 from taichi_ants.analysis.findings import Contrast, Criterion, Finding, Verdict, judge, weakest
-from taichi_ants.analysis.tables import Block, Table, interval, markdown, number, sentence, tally
+from taichi_ants.analysis.tables import Table, interval, number, sentence, tally
 from taichi_ants.files import tomllib
 
 
@@ -161,40 +161,3 @@ def _cell(finding: Finding) -> str:
         return finding.verdict.value
     numbers = f"{number(finding.effect)} {interval(finding.low, finding.high)}"
     return f"{finding.verdict.value}\n{finding.contrast.label}\n{numbers}"
-
-
-def claims_markdown(audit: Audit, world: str) -> str:
-    """Return a table of all claims with effects and intervals as Markdown, with an explanation."""
-    rows = [
-        [
-            *(claim.id, claim.section, claim.statement, claim.tested_on, claim.asked),
-            *map(_effect, findings.values()),
-        ]
-        for claim, findings in audit.items()
-    ]
-    settings = next(iter(audit.values()))
-    headers = ("Claim", "Section", "The paper, in our words", "Tested on", "Criterion", *settings)
-    level = next(iter(settings.values())).level
-    blocks: list[Block] = [
-        f"World: {world}.",
-        "\n".join(f"- {line}." for line in tallies(audit)),
-        "Effects are paired by seed. If the verdict by the mean differs, it follows the one by the "
-        "IQM. For claims with several contrasts, the table shows the weakest one. Intervals are at "
-        f"{100 * level:.3f} % each, so that all hold at once with 95 %. docs/statistics.md "
-        "explains estimators, verdicts and margins.",
-        Table("", headers, rows, text_columns=len(headers)),
-    ]
-    return markdown(blocks)
-
-
-def _effect(finding: Finding) -> str:
-    """Return verdict, effect, interval and contrast; then those by mean if the verdict differs."""
-    if finding.verdict is Verdict.NOT_TESTED:
-        return finding.verdict.value
-    digits = 1 if finding.contrast.uses_iqm else 2
-    span = interval(finding.low, finding.high, digits)
-    text = f"**{finding.verdict.value}** {number(finding.effect, digits)} {span}, "
-    text += finding.contrast.label
-    if finding.by_mean and finding.by_mean.verdict is not finding.verdict:
-        text += f"; by mean: {_effect(finding.by_mean)}"
-    return text

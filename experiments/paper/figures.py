@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from paper.baselines import Baseline
 from paper.comparison import FIGURE_1, Comparison, Variant
 from paper.table2 import shown_position
 from taichi_ants.analysis import style
 from taichi_ants.analysis.behaviour import BEHAVIOURS, counts
-from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.drawings import Drawing, drawings
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import BLUE, COLOURS, INK, ORANGE, WINE

@@ -13,12 +13,12 @@ from policy_sheet import policy_sheet
 
 from paper import comparison as paper
 from paper import figures, process, report
+from paper.baselines import Baseline
 from paper.claims import Audit, headlines
 from paper.comparison import Comparison
 from paper.table2 import Line, example_name, summarise_behaviours
 from taichi_ants import files
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
-from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
@@ -27,7 +27,7 @@ from taichi_ants.report.page import Picture, Player, Shown, Statement, Statement
 from taichi_ants.studies.command_line import progress_bar
 from taichi_ants.studies.points import RunPoint
 from taichi_ants.task import Task
-from taichi_ants.viewer import record_episode
+from taichi_ants.viewer import record_trace
 
 STEPS = 80  # the longest recording; a delivery takes 34 steps, walking to and fro on the trail 38
 SIZE = 720, 480  # of animations
@@ -100,7 +100,7 @@ def begin(
         )
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Shown: {whose}."
-        recording = process.begin(record_episode, episode, BEHAVIOURS[code])
+        recording = process.begin(record_trace, episode.trace, BEHAVIOURS[code])
         recorded.append((sentence(BEHAVIOURS[code]), words, recording))
         if code == DELIVERS:
             title = f"{variant.label}: policy"

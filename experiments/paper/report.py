@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from paper.baselines import Baseline
 from paper.claims import Audit, headlines, tallies
 from paper.comparison import GREEDY_RETURN, GREEDY_STEPS, Comparison
 from paper.table2 import (
@@ -13,14 +14,12 @@ from paper.table2 import (
     Line,
 )
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, counts
-from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.statistics import Estimator
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,
     Table,
     interval,
-    markdown,
     number,
     percent,
     plain_text,
@@ -42,11 +41,6 @@ def report(comparison: Comparison, lines: Sequence[Line], audit: Audit) -> str:
     tables = _glance(lines), headlines(audit), behaviour_counts(comparison)
     claims = [f"The paper's {len(audit)} claims", *(f"  {line}" for line in tallies(audit))]
     return plain_text([*heading(comparison), *tables, "\n".join(claims)], WIDTH)
-
-
-def table2_markdown(comparison: Comparison, lines: Sequence[Line]) -> str:
-    """Return our version of the paper's table 2, with the paper's numbers, as Markdown."""
-    return markdown([*heading(comparison), *figure_tables(lines, comparison), greedy_table(lines)])
 
 
 def heading(comparison: Comparison) -> list[Block]:

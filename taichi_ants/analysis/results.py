@@ -67,8 +67,7 @@ class Comparison:
         measure: The name of the measure.
         first, second: The means over seeds of the two results.
         difference: The mean of first minus second.
-        low, high: The ends of the interval of the difference; nan for a single seed.
-        level: The probability with which the interval contains the true difference.
+        low, high: The ends of the 95 % interval of the difference; nan for a single seed.
         seeds: The number of seeds that have a value in both results.
         differences: The difference of each of these seeds.
     """
@@ -79,14 +78,13 @@ class Comparison:
     difference: float
     low: float
     high: float
-    level: float
     seeds: int
     differences: tuple[float, ...]
 
     def __repr__(self) -> str:
         return (
             f"Comparison({self.measure}: {self.first:.4g} and {self.second:.4g}, difference "
-            f"{self.difference:.4g} [{self.low:.4g}, {self.high:.4g}], {100 * self.level:g} % "
+            f"{self.difference:.4g} [{self.low:.4g}, {self.high:.4g}], 95 % "
             f"interval over {self.seeds} paired seeds)"
         )
 
@@ -98,7 +96,6 @@ def compare(
     *,
     configurations: tuple[int, int] = (0, 0),
     last: int | None = None,
-    level: float = 0.95,
 ) -> Comparison:
     """Return the difference of a measure between two results, a minus b, paired by seed.
 
@@ -109,15 +106,13 @@ def compare(
         measure: The name of a measure that both results have.
         configurations: The numbers of the configurations of a and b; 0 for colonies.
         last: The number of episodes to use, from the last one; None uses all.
-        level: The probability with which the bootstrap interval contains the true difference.
 
     Raises:
         AntsError: The seeds differ, a result does not have the measure or the configuration, or no
             seed has a value in both results.
     """
-    _check_results({"a": a, "b": b})
-    if not isinstance(level, (int, float)) or not 0 < level < 1:
-        raise AntsError(f"level is {shown(level)}; it must be a number between 0 and 1.")
+    expect("a", a, Tidy)
+    expect("b", b, Tidy)
     tables = a.measured(), b.measured()
     if tables[0].seeds != tables[1].seeds:
         raise AntsError(
@@ -134,7 +129,7 @@ def compare(
         raise AntsError(f"no seed has a value of {measure!r} in both results; run more ticks.")
     first, second = (sample[both] for sample in values)
     differences = first - second
-    low, high = (float(end[0]) for end in bootstrap_interval(differences[None], level))
+    low, high = (float(end[0]) for end in bootstrap_interval(differences))
     return Comparison(
         measure=measure,
         first=float(first.mean()),
@@ -142,15 +137,9 @@ def compare(
         difference=float(differences.mean()),
         low=low,
         high=high,
-        level=float(level),
         seeds=len(differences),
         differences=tuple(differences.tolist()),
     )
-
-
-def _check_results(results: Mapping[str, object]) -> None:
-    for name, result in results.items():
-        expect(name, result, Tidy)
 
 
 def summary(result: Tidy, last: int | None = None) -> Summary:
@@ -162,7 +151,7 @@ def summary(result: Tidy, last: int | None = None) -> Summary:
         result: The result of `Colony.run`, `train` or `evaluate`.
         last: The number of episodes to use, from the last one; None uses all.
     """
-    _check_results({"result": result})
+    expect("result", result, Tidy)
     table, rows = result.measured(), []
     if not table.values:
         raise AntsError(_NO_NUMBERS)
@@ -199,7 +188,8 @@ def plot(
         expect("path", path, str, Path)
         check_one_of("the suffix of path", Path(path).suffix, (".png",))
     named = results if isinstance(results, Mapping) else {"result": results}
-    _check_results(named)
+    for name, result in named.items():
+        expect(name, result, Tidy)
     table = _together({name: result.measured() for name, result in named.items()})
     names = [part for name in measures for part in parts_of(table, name)] or list(table.plotted)
     if not names:
@@ -295,12 +285,8 @@ def curves(table: Measured, measure: str, across: str) -> Iterator[tuple[np.ndar
     By tick, values are means over episodes, and an episode that has ended keeps its last value. By
     episode, the value is that at the last tick. Values are nan where there are none.
     """
-    values, ticks, episodes = (
-        checked_measure(table, measure),
-        table.index["tick"],
-        table.index["episode"],
-    )
-    order = np.lexsort((ticks, episodes, table.of_seed, table.of_group))
+    values, episodes = checked_measure(table, measure), table.index["episode"]
+    order = np.lexsort((table.index["tick"], episodes, table.of_seed, table.of_group))
     if across == _EPISODES:
         order = order[last_rows(table)[order]]
     for group in range(len(table.groups)):

@@ -26,8 +26,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
-
 RESAMPLES = 40_000
 RANDOM_SEED = 20_250_801
 # Differences of means of integers carry rounding errors of about 1e-15 of their size.
@@ -149,11 +147,11 @@ def bootstrap_interval(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the bootstrap interval of the mean over seeds (expanded BCa) or the IQM (percentiles).
 
-    Both ends are float64 (rows,), for values (rows, seeds). They are nan for fewer than two seeds
-    and for rows with a nan, and equal if all seeds of a row are.
+    Both ends are float64 (rows,), for values (rows, seeds), or (seeds,) for a single row. They are
+    nan for fewer than two seeds and for rows with a nan, and equal if all seeds of a row are.
     """
     # Rows often repeat, for example where all runs of two configurations deliver equally often.
-    bits = np.ascontiguousarray(_rows(values)).view(np.int64)
+    bits = np.ascontiguousarray(np.atleast_2d(np.asarray(values, float))).view(np.int64)
     distinct, place = np.unique(bits, axis=0, return_inverse=True)
     values = distinct.view(float)
     rows, n = values.shape
@@ -166,23 +164,13 @@ def bootstrap_interval(
     return low, high
 
 
-def _rows(values: np.ndarray) -> np.ndarray:
-    rows = np.asarray(values, float)
-    if rows.ndim != 2:
-        raise AntsError(
-            f"values has shape {rows.shape}, but must have the shape (rows, seeds); pass "
-            "values[None] for a single row."
-        )
-    return rows
-
-
 def student_interval(
     values: np.ndarray, level: float = 0.95, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return Student's t interval of the mean over seeds; with `iqm`, Tukey and McLaughlin's."""
     from scipy.special import stdtrit
 
-    values = _rows(values)
+    values = np.asarray(values, float)
     rows, n = values.shape
     if n < 2:
         return np.full(rows, np.nan), np.full(rows, np.nan)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,21 +47,6 @@ def styled() -> AbstractContextManager:
 
     defaults = {name: value for name, value in rcParamsDefault.items() if "backend" not in name}
     return rc_context({**defaults, **_settings()})
-
-
-@contextmanager
-def all_or_none(*folders: Path) -> Iterator[None]:
-    """Yield while figures are drawn into folders; if one fails, remove them and report the error.
-
-    So a figure that fails does not cost the tables, which must have been written before.
-    """
-    try:
-        yield
-    except Exception as error:
-        for folder in folders:
-            shutil.rmtree(folder, ignore_errors=True)
-        reason = " ".join(f"{type(error).__name__}: {error}".split()).rstrip(".")
-        print(f"warning: there are no figures, because one failed with {reason}.", file=sys.stderr)
 
 
 def label(name: str) -> str:

@@ -62,7 +62,7 @@ def _check_live(
         picture = settings.render or "missing"
         error(
             f"--frame-interval requires an animation, but --render is {picture}; name a .gif or "
-            ".mp4 file or a folder"
+            ".mp4 file"
         )
 
 
@@ -97,7 +97,7 @@ def _add_live(parser: command_line.Parser) -> None:
     add = parser.add_argument_group("files").add_argument
     add("--save", metavar="FILE", help="save the colony at the end (.npz)")
     add("--resume", metavar="FILE", help="resume a saved colony (.npz)")
-    picture = "draw the last tick (.png), or an animation (.gif, .mp4, or a folder of pictures)"
+    picture = "draw the last tick (.png), or an animation (.gif or .mp4)"
     add("--render", metavar="PATH", help=picture)
     add("--frame-interval", **COUNT, default=2, help="ticks per frame of an animation")
     figure = "plot the deliveries per tick of all colonies together (.png), with the numbers (.csv)"

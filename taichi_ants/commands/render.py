@@ -1,8 +1,8 @@
 """Render an episode or a colony.
 
 Both use the policy in a file, or train one first. The extension of --out selects the file type:
-.gif, .mp4, .png (only the last tick) or .html, a page that plays. Without an extension, --out is a
-folder of PNG pictures. See `%(prog)s episode --help` for the options of episodes.
+.gif, .mp4, .png (only the last tick) or .html, a page that plays. See `%(prog)s episode --help` for
+the options of episodes.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ _PLAIN = {"action": "store_false", "dest": "overlay"}
 
 # Help text and arguments of `add_argument` of each option.
 OPTIONS: dict[str, tuple[str, dict[str, Any]]] = {
-    "--out": ("file or folder to write", {"metavar": "PATH"}),
+    "--out": ("file to write", {"metavar": "PATH"}),
     "--title": ("title of the picture or page", {"metavar": "TEXT"}),
     "--world": (WORLDS, {"default": "paper", "metavar": "WORLD"}),
     "--seed": ("seed of training and rendering", _SEED),
@@ -161,13 +161,13 @@ def show_episode(settings: argparse.Namespace, world: World) -> str:
     """Return a summary of an episode after writing its page, animation, or last picture."""
     from taichi_ants.errors import count
     from taichi_ants.rendering import Episode
-    from taichi_ants.viewer import record_episode, save_page
+    from taichi_ants.viewer import record_trace, save_page
 
     q_values, task, title = find_policy(settings, world)
     rules = {"seed": settings.seed, "max_steps": settings.max_steps, "epsilon": settings.epsilon}
     episode = Episode.play(world, q_values, task=task, **rules)
     if is_page(settings):
-        save_page(settings.out, record_episode(episode, title))
+        save_page(settings.out, record_trace(episode.trace, title))
     else:
         _save_snapshots(settings, episode.snapshots(), len(episode), title, task)
     outcome = "delivered" if episode.delivered else "not delivered"

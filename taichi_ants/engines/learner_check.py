@@ -4,6 +4,8 @@ Taichi's compiler can crash on unexpected code, and compiled code can crash when
 array. So the command `taichi-ants check FILE` runs it in a separate process.
 """
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
 
@@ -24,10 +26,27 @@ def fault_of(learner: Learner) -> str:
     the memory of the second of two runs; that of the first must not change.
     """
     runtime.start_with_checks()
-    fault = _fault(learner, False) or _fault(learner, True)
-    if not fault and learner.td_error and (learner.plans or not learner.draws_next_action):
-        fault = _fault_without_next_action(learner)
-    return fault
+    settings = learner.hyperparameters()
+    memory = learner.memory(settings, _STATES)
+    sizes = ((1 + memory.tables) * _STATES * ROW, memory.floats, memory.integers)
+    learn, more = _kernel(learner, sizes), np.array([*vars(settings).values(), 0.0])
+    numbers = np.arange(sizes[0])
+    for values in (0.0, np.where(numbers % 3, 1, -1) * 10.0 ** (numbers % 13 / 2 - 2)):
+        types = (np.float32, np.float32, np.int32)
+        arrays = [np.zeros((2, size), dtype) for size, dtype in zip(sizes, types, strict=True)]
+        arrays[0][:] = values
+        first = [array[0].copy() for array in arrays]
+        try:
+            learn(*[array.reshape(-1) for array in arrays], more)
+        except Exception as error:
+            # Only Taichi's debug mode checks the user's own assertions; training ignores them.
+            if not isinstance(error, ti.TaichiAssertionError) or "Out of bound" in str(error):
+                return last_line(error)
+        if not all(map(np.array_equal, first, [array[0] for array in arrays])):
+            return "it writes outside the memory of its run, which begins at `at`"
+    if learner.td_error and (learner.plans or not learner.draws_next_action):
+        return _fault_without_next_action(learner)
+    return ""
 
 
 def _fault_without_next_action(learner: Learner) -> str:
@@ -47,31 +66,8 @@ def _fault_without_next_action(learner: Learner) -> str:
     return ""
 
 
-def _fault(learner: Learner, wide: bool) -> str:
-    settings = learner.hyperparameters()
-    memory = learner.memory(settings, _STATES)
-    sizes = ((1 + memory.tables) * _STATES * ROW, memory.floats, memory.integers)
-    types = (np.float32, np.float32, np.int32)
-    arrays = [np.zeros((2, size), dtype) for size, dtype in zip(sizes, types, strict=True)]
-    if wide:
-        numbers = np.arange(sizes[0])
-        arrays[0][:] = np.where(numbers % 3, 1, -1) * 10.0 ** (numbers % 13 / 2 - 2)
-    before = [array[0].copy() for array in arrays]
-    more = np.array([*vars(settings).values(), 0.0])
-    try:
-        _learn_by(learner, [array.reshape(-1) for array in arrays], more, sizes)
-    except Exception as error:
-        # Only Taichi's debug mode checks the user's own assertions; training ignores them.
-        theirs = isinstance(error, ti.TaichiAssertionError) and "Out of bound" not in str(error)
-        return "" if theirs else last_line(error)
-    stays = all(map(np.array_equal, before, [array[0] for array in arrays]))
-    return "" if stays else "it writes outside the memory of its run, which begins at `at`"
-
-
-def _learn_by(
-    learner: Learner, arrays: list[np.ndarray], hyperparameters: np.ndarray, sizes: tuple
-) -> None:
-    """Learn for 1000 steps of the second of two runs, in episodes of at most 50 steps."""
+def _kernel(learner: Learner, sizes: tuple[int, int, int]) -> Any:
+    """Return a kernel of 1000 steps of the second of two runs, in episodes of at most 50 steps."""
     f32 = ti.types.ndarray(dtype=ti.f32, ndim=1)
     i32 = ti.types.ndarray(dtype=ti.i32, ndim=1)
     f64 = ti.types.ndarray(dtype=ti.f64, ndim=1)
@@ -107,4 +103,4 @@ def _learn_by(
             )
             _, random_state = learner.learn(memory, at, step, rates, random_state)
 
-    learn(*arrays, hyperparameters)
+    return learn

@@ -123,7 +123,7 @@ def difference(rule: Rule, n: int = TRIES) -> str:
         return last_line(error)
     for (inputs, parameters), result in zip(drawn, results.tolist(), strict=True):
         try:
-            reference = float(rule.reference(**inputs, **parameters))
+            reference = float(rule.function(**inputs, **parameters))
         except Exception as error:
             said = f"{type(error).__name__}: {error}"
             return f"its Python function fails ({said}) for {values_shown(inputs, parameters)}"

@@ -17,6 +17,5 @@ register(
 )
 register(
     "taichi_ants/HexColony-v0",
-    entry_point="taichi_ants.envs.colony:single",
     vector_entry_point="taichi_ants.envs.colony:HexColonyVectorEnv",
 )

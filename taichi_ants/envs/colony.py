@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -58,7 +58,7 @@ class ColonyWorlds(Ants):
         super().__init__(n_worlds, task, arguments, supports, METADATA["render_modes"])
         self.colony = Colony(
             [self.worlds[w % len(self.worlds)] for w in range(n_worlds)],
-            replace(task, evaporation_in_evaluation=self.evaporates),
+            replace(task, evaporation_in_evaluation=task.evaporation_in_training),
             training=None,
             seeds=range(n_worlds),
             ants=ants,
@@ -70,7 +70,6 @@ class ColonyWorlds(Ants):
         self.acted, self.rewards = np.zeros(shape, bool), np.zeros(shape)
         self.events = np.full(shape, Event.NONE, np.int64)
         self.deliveries = np.zeros(shape, np.int64)
-        self._counted = np.zeros(n_worlds, np.int64)  # ticks whose deliveries are counted
         self._last: dict[str, np.ndarray] = {}
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
@@ -89,29 +88,20 @@ class ColonyWorlds(Ants):
         if (which & ~new).any():
             self.colony.reset_worlds(which & ~new)
         self.events = np.where(which[:, None], Event.NONE, self.events)
-        self.deliveries[which], self._counted[which] = 0, 0
+        self.deliveries[which] = 0
 
     def step(self, actions: np.ndarray) -> None:
         """Take the actions of all ants, integers 0 to 4; worlds at their end do not change."""
         colony = self.colony
-        self._count()  # a step that was interrupted
         colony.stop(self.over())
         self.acted = colony.living & colony.running[:, None]
         colony.act(actions)
         events = np.where(self.acted, colony.events, Event.NONE)
         self.rewards = np.where(self.acted, colony.rewards, 0).astype(np.float64)
         self.events = events.astype(np.int64)
-        self._count()
-
-    def _count(self) -> None:
-        """Count the deliveries of the last tick, if they are not counted yet."""
-        ticks = self.colony.episode_ticks
-        if (ticks == self._counted).all():
-            return
-        counted = self.deliveries + (self.colony.events == Event.DELIVERED)
-        counted *= self.acted  # a newborn ant starts at 0 in a slot that was free
-        self.deliveries = np.where((ticks > self._counted)[:, None], counted, self.deliveries)
-        self._counted = ticks.copy()
+        # A newborn ant starts at 0 in a slot that was free.
+        counted = (self.deliveries + (events == Event.DELIVERED)) * self.acted
+        self.deliveries = np.where(colony.running[:, None], counted, self.deliveries)
 
     def over(self) -> np.ndarray:
         return self.colony.episode_ticks >= self.max_steps
@@ -129,7 +119,6 @@ class ColonyWorlds(Ants):
         self, actions: np.ndarray, waiting: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Take a step, and return its rewards, terminations and truncations, (n,)."""
-        self._count()  # a step that was interrupted
         if self.task.delivery == "terminates":  # the next episode of these ants has begun
             delivered = self.colony.events == Event.DELIVERED
             self.deliveries = np.where(delivered, 0, self.deliveries)
@@ -245,7 +234,7 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
     w is entry w modulo n.
     - `task`: See `HexForageEnv`; without births and lifespan.
     - `ants`: The number of ants in each world.
-    - `start`, `max_steps`, `observation_format`, `evaporation`: See `HexColonyParallelEnv`.
+    - `start`, `max_steps`, `observation_format`: See `HexColonyParallelEnv`.
     - `autoreset_mode`, `max_episode_steps`: See `HexForageVectorEnv`.
     - `render_mode`: "rgb_array" for a picture of each ant's world, or None.
     """
@@ -261,7 +250,6 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         start: str = "nest",
         max_steps: int = MAX_STEPS,
         observation_format: ObservationFormat = "cells",
-        evaporation: bool | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.SAME_STEP,
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
@@ -271,9 +259,7 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
             raise AntsError(
                 f"num_envs is {num_envs}; it counts ants, so it must be a multiple of ants, {ants}."
             )
-        arguments = Arguments(
-            world, max_steps, observation_format, evaporation, render_mode, max_episode_steps
-        )
+        arguments = Arguments(world, max_steps, observation_format, render_mode, max_episode_steps)
         # The number of ants is fixed.
         supports = SUPPORTS - {"life.births", "life.lifespan"}
         worlds = ColonyWorlds(n // ants, task, arguments, ants, start, supports=supports)
@@ -285,11 +271,3 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
                 'begins in the step of its delivery; use "SameStep", or a task with delivery '
                 '"truncates".'
             )
-
-
-def single(**_: Any) -> NoReturn:
-    """Refuse `gymnasium.make`: AntsError, because a colony has several ants."""
-    raise AntsError(
-        "taichi_ants/HexColony-v0 has an environment for each ant of a colony; use "
-        "gymnasium.make_vec, for example with num_envs=64 and ants=64."
-    )

@@ -10,7 +10,7 @@ from gymnasium.utils import seeding
 
 from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.vector import Arguments, Place, Rules, check_options
+from taichi_ants.envs.vector import Arguments, Place, Rules
 from taichi_ants.errors import missing, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Life
@@ -49,7 +49,6 @@ class HexColonyParallelEnv(ParallelEnv):
       task has births.
     - `max_steps`: The number of steps of an episode.
     - `observation_format`: "cells", "index" or "one_hot".
-    - `evaporation`: Whether trails evaporate; by default, the task's `evaporation_in_training`.
     - `render_mode`: "rgb_array" for pictures, or None.
 
     Attributes:
@@ -69,10 +68,9 @@ class HexColonyParallelEnv(ParallelEnv):
         capacity: int | None = None,
         max_steps: int = MAX_STEPS,
         observation_format: ObservationFormat = "cells",
-        evaporation: bool | None = None,
         render_mode: str | None = None,
     ) -> None:
-        arguments = Arguments(world, max_steps, observation_format, evaporation, render_mode)
+        arguments = Arguments(world, max_steps, observation_format, render_mode)
         self._worlds = ColonyWorlds(1, task, arguments, ants, start, capacity)
         self.render_mode = render_mode
         colony = self._worlds.colony
@@ -102,12 +100,11 @@ class HexColonyParallelEnv(ParallelEnv):
         Args:
             seed: The seed of this and all further episodes, which then repeat exactly. None
                 continues the random numbers, or draws a seed in the first reset.
-            options: There are none.
+            options: There are none; any are ignored.
 
         Returns:
             Observations and infos by agent.
         """
-        check_options(options, "options")  # the key of PettingZoo's tests, without effect
         if seed is not None:
             seeding.np_random(seed)  # raises Gymnasium's error for invalid seeds
         elif not self._begun:
@@ -148,12 +145,16 @@ class HexColonyParallelEnv(ParallelEnv):
             EnvLogger.warn_step_after_terminated_truncated()
             return {}, {}, {}, {}, {}
         worlds, acting, slots = self._worlds, self.agents, self._slots
-        if not isinstance(actions, dict) or not actions.keys() <= set(acting):
-            raise AssertionError(
-                f"the actions are {shown(actions)}; give a dict with an action for each of agents."
-            )
+        agents = set(acting)
+        for name in dict.fromkeys([*acting, *actions]):
+            action = actions.get(name)
+            if name not in agents or not self.action_spaces[name].contains(action):
+                raise AssertionError(
+                    f"the action of {name} is {shown(action)}; give each of `agents`, and no "
+                    f"other, a whole number from 0 to {N_ACTIONS - 1}."
+                )
         chosen = np.zeros((1, worlds.colony.capacity), np.int64)
-        chosen[0, slots] = [self._action(actions, name) for name in acting]
+        chosen[0, slots] = [actions[name] for name in acting]
         worlds.step(chosen)
         living, ended = worlds.colony.living[0], bool(worlds.over()[0])
         born = np.setdiff1d(np.flatnonzero(living & (not ended)), slots).tolist()
@@ -165,14 +166,6 @@ class HexColonyParallelEnv(ParallelEnv):
         stay = [] if ended else [k for k, slot in enumerate(seen) if living[slot]]
         self.agents, self._slots = [names[k] for k in stay], [seen[k] for k in stay]
         return observations, rewards, terminated, truncated, infos
-
-    def _action(self, actions: dict[str, int], name: str) -> int:
-        if name not in actions or not self.action_spaces[name].contains(actions[name]):
-            said = f"{shown(actions[name])}" if name in actions else "missing"
-            raise AssertionError(
-                f"the action of {name} is {said}; give a whole number from 0 to {N_ACTIONS - 1}."
-            )
-        return int(actions[name])
 
     def _names(self, slots: list[int]) -> list[str]:
         numbers = self._worlds.colony.numbers[0, slots]

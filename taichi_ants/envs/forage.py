@@ -21,11 +21,10 @@ from taichi_ants.envs.vector import (
     Ants,
     AntVectorEnv,
     Arguments,
+    OfAnts,
     Place,
     Rules,
-    StepLimit,
     Worlds,
-    check_options,
     task_of,
 )
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
@@ -72,7 +71,7 @@ class LoneAnts(Ants):
             raise AntsError(f"num_envs is {n}; it must be at most {most} for a world of this size.")
         self._text = arguments.render_mode == "ansi"
         self.batched = BatchedEnvironments(
-            self.worlds, task, n, self.max_steps, delivery, self.evaporates
+            self.worlds, task, n, self.max_steps, delivery, task.evaporation_in_training
         )
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
@@ -158,7 +157,7 @@ def _text_of(now: Snapshot) -> str:
     return text_map.drawing(now.grid.ranges, marks)
 
 
-class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
+class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
     """An ant on a hexagonal grid that searches for food and carries it to its queen.
 
     The rules are those of "Ants and Reinforcement Learning Algorithms". See
@@ -188,12 +187,10 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
       under the paper's rewards walking a trail can pay more than delivering.
 
     ## Arguments
-    - `world`: The name of a registered world, the path or the text of a map, or a World or its
-      `as_dict()`.
-    - `task`: The rules, a `taichi_ants.Task`, its `as_dict()` or its name; by default, the paper's.
-      AntsError if a rule is only for colonies.
+    - `world`: The name of a registered world, the path or the text of a map, or a World.
+    - `task`: The rules, a `taichi_ants.Task` or its name; by default, the paper's. Trails evaporate
+      if its `evaporation_in_training` is True. AntsError if a rule is only for colonies.
     - `delivery`: "terminates", "truncates" or "continues" the episode; by default, the task's.
-    - `evaporation`: Whether trails evaporate; by default, the task's `evaporation_in_training`.
     - `max_steps`: The number of steps after which an episode is truncated.
     - `observation_format`: "cells", "index" or "one_hot".
     - `render_mode`: "rgb_array" for pictures, uint8 (720, 1280, 3), or "ansi" for text maps, in
@@ -208,16 +205,14 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         world: Place = "paper",
         task: Rules | None = None,
         delivery: str | None = None,
-        evaporation: bool | None = None,
         max_steps: int = EPISODE_STEPS,
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
     ) -> None:
-        arguments = Arguments(world, max_steps, observation_format, evaporation, render_mode)
+        arguments = Arguments(world, max_steps, observation_format, render_mode)
         self._ants = LoneAnts(1, task, delivery, arguments)
         self._arrays, self.render_mode = self._ants.batched.arrays, render_mode
         self.observation_space, self.action_space = self._ants.shown.space, Discrete(N_ACTIONS)
-        self._begun = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -227,7 +222,6 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         The seed determines all random numbers, so episodes with a seed repeat exactly. There are no
         options.
         """
-        check_options(options)
         super().reset(seed=seed)
         if seed is None and not self._begun:
             seed = int(self.np_random.integers(2**63))
@@ -245,9 +239,9 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
             ResetNeeded: No episode has begun, or it has ended.
             InvalidAction: The action does not exist.
         """
-        if self._over:
-            why = "the episode has ended" if self._begun else "no episode has begun"
-            raise ResetNeeded(f"{why}; call reset() before step().")
+        self._check_begun("step()")
+        if self._arrays["results"][0] >= TRUNCATED:
+            raise ResetNeeded("the episode has ended; call reset() before step().")
         if not self.action_space.contains(action):
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
         self._ants.batched.step(action)
@@ -255,10 +249,6 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         result, reward = int(arrays["results"][0]), float(arrays["rewards_of"][0])
         observation, info = self._seen()
         return observation, reward, result & TERMINATED != 0, result & TRUNCATED != 0, info
-
-    @property
-    def _over(self) -> bool:
-        return not self._begun or bool(self._arrays["results"][0] >= TRUNCATED)
 
     def _seen(self) -> tuple[Any, dict[str, Any]]:
         arrays = self._arrays
@@ -272,14 +262,12 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
 
     def action_masks(self) -> np.ndarray:
         """Return the actions that can succeed now, bool (5,): `info["action_mask"]` as bool."""
-        if not self._begun:
-            raise ResetNeeded("no episode has begun; call reset() before action_masks().")
+        self._check_begun("action_masks()")
         return ACTION_MASKS[self._arrays["paper_states"][0]].astype(bool)
 
     def render(self) -> Any:
         """Return a picture or a text map of the world, depending on `render_mode`, or None."""
-        if not self._begun:
-            raise ResetNeeded("no episode has begun; call reset() before render().")
+        self._check_begun("render()")
         return None if self.render_mode is None else self._ants.draw(0)
 
 
@@ -306,7 +294,6 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         world: Worlds = "paper",
         task: Rules | None = None,
         delivery: str | None = None,
-        evaporation: bool | None = None,
         max_steps: int = EPISODE_STEPS,
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
@@ -314,8 +301,6 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         max_episode_steps: int | None = None,
     ) -> None:
         n = checked_whole("num_envs", num_envs)
-        arguments = Arguments(
-            world, max_steps, observation_format, evaporation, render_mode, max_episode_steps
-        )
+        arguments = Arguments(world, max_steps, observation_format, render_mode, max_episode_steps)
         ants = LoneAnts(n, task, delivery, arguments)
         super().__init__(ants, n, n, autoreset_mode, render_mode)

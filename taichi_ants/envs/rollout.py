@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from gymnasium.error import InvalidAction
 
-from taichi_ants.errors import AntsError, as_array, checked_whole, shown
+from taichi_ants.errors import as_array, checked_whole, shown
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import GAMMA, mix, stream_state
 from taichi_ants.learners.policies import checked_table, frozen_policy
@@ -62,11 +62,6 @@ class Rollout(NamedTuple):
         """Raise AntsError unless the arrays of this `out` have the shapes and types of another."""
         for name, mine, wanted in zip(self._fields[:-1], self, other, strict=False):
             as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
-            if not mine.flags.carray:
-                raise AntsError(
-                    f"out.{name} is not contiguous or not writeable; give a rollout that "
-                    "`rollout` returned."
-                )
 
 
 class TablePolicy(NamedTuple):
@@ -151,25 +146,8 @@ def checked_plan(
         except ValueError:  # lists of several lengths
             plan = np.empty(0)
         if plan.dtype.kind in "iu":
-            if plan.ndim != 2 or not len(plan):
-                raise InvalidAction(
-                    f"the actions are {shown(policy)}; they must be an array of shape (steps, {n}) "
-                    "with at least one step."
-                )
-            if steps not in (None, len(plan)):
-                raise AntsError(
-                    f"steps is {shown(steps)}, but there are actions for {len(plan)} steps; leave "
-                    "steps out."
-                )
-            actions = checked_actions(plan, (len(plan), n))
-            return len(plan), np.ascontiguousarray(actions, np.int64), None
-        if plan.dtype.kind != "f" or plan.shape[-2:] != (task.n_states, N_ACTIONS):
-            raise AntsError(
-                f"policy is {shown(policy)}; give actions, integers of shape (steps, {n}), or a "
-                f"policy: action values of shape ({task.n_states}, {N_ACTIONS}), a name, or the "
-                "path of a policy file."
-            )
+            length = steps or max(1, np.atleast_1d(plan).shape[0])
+            actions = checked_actions(plan, (length, n))
+            return length, np.ascontiguousarray(actions, np.int64), None
         table = checked_table(policy, task)
-    if steps is None:
-        raise AntsError("steps is None; give the number of steps in which ants follow the policy.")
     return checked_whole("steps", steps), None, table

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,8 +22,8 @@ from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.envs.rollout import Rollout, TablePolicy, checked_actions, checked_plan
 from taichi_ants.errors import (
     AntsError,
+    as_array,
     check_one_of,
-    checked_flag,
     checked_whole,
     expect,
     shown,
@@ -36,9 +37,9 @@ from taichi_ants.worlds import World, build, from_text
 if TYPE_CHECKING:
     from taichi_ants.rendering import Scene
 
-Place = str | os.PathLike[str] | Mapping[str, Any] | World
+Place = str | os.PathLike[str] | World
 Worlds = Place | Sequence[Place]
-Rules = Task | Mapping[str, Any] | str
+Rules = Task | str
 
 
 def _action_masks() -> np.ndarray:
@@ -61,7 +62,6 @@ class Arguments(NamedTuple):
     world: Worlds
     max_steps: int
     observation_format: ObservationFormat
-    evaporation: bool | None
     render_mode: str | None
     max_episode_steps: int | None = None
 
@@ -72,7 +72,6 @@ class Ants(ABC):
     Attributes:
         task: The rules.
         worlds: Worlds with the same ranges; world number w is worlds[w % len(worlds)].
-        evaporates: Whether trails evaporate.
         max_steps: The step limit of an episode.
         shown: The format of observations.
     """
@@ -86,9 +85,6 @@ class Ants(ABC):
         render_modes: Sequence[str],
     ) -> None:
         self.task, self.worlds = task, _worlds_of(arguments.world, n_worlds, supports)
-        self.evaporates = task.evaporation_in_training
-        if arguments.evaporation is not None:
-            self.evaporates = checked_flag("evaporation", arguments.evaporation)
         if arguments.render_mode is not None:
             check_one_of("render_mode", arguments.render_mode, render_modes)
         self.max_steps = checked_max_steps(arguments.max_steps, task)
@@ -151,8 +147,7 @@ class Ants(ABC):
 
 
 def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World, ...]:
-    single = isinstance(world, (str, os.PathLike, Mapping, World))
-    entries = [world] if single else world
+    entries = [world] if isinstance(world, (str, os.PathLike, World)) else world
     if not isinstance(entries, (list, tuple)) or not entries:
         raise AntsError(
             f"world is {shown(world)}; give the name of a world, a World, or a list of them."
@@ -168,48 +163,31 @@ def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World,
 
 
 def _world_of(world: Any) -> Any:
-    if isinstance(world, Mapping):
-        try:
-            return World.from_dict(world)
-        except (KeyError, TypeError) as error:
-            raise AntsError(
-                f"the world is {shown(world)}; give a World or its `as_dict()`."
-            ) from error
     text = isinstance(world, str) and "\n" in world
     return world if isinstance(world, World) else from_text(world) if text else build(world)
 
 
 def task_of(task: Rules | None) -> Task:
-    """Return the task that is given as one, as its `as_dict()` or by its name, or the paper's."""
-    if isinstance(task, Mapping):
-        return Task.from_dict(task)
+    """Return the task that is given as one or by its name, or the paper's."""
     if isinstance(task, str):
         check_one_of("task", task, tuple(Task.named()))
         return Task.named()[task]
     return Task() if task is None else task
 
 
-def check_options(options: Any, *allowed: str) -> dict[str, Any]:
-    """Return the options of a reset; AntsError for others, TypeError unless they are a dict."""
-    if not isinstance(options, (dict, type(None))):
-        raise TypeError(f"options is {shown(options)}; it must be a dict or None.")
-    for name in options or {}:
-        if name not in allowed:
-            raise AntsError(
-                f"options has the key {shown(name)}, but reset reads "
-                f"{' '.join(allowed) or 'none'}; leave it out, or create another environment."
-            )
-    return options or {}
-
-
-class StepLimit:
-    """Base of environments whose `spec` has their own step limit and can be written as JSON.
+class OfAnts:
+    """Base of environments, which know whether they were reset, and whose `spec` has a step limit.
 
     Gymnasium sets `max_episode_steps` only if it wraps an environment in a `TimeLimit`.
     """
 
     _ants: Ants
+    _begun = False
     _spec: EnvSpec | None = None
+
+    def _check_begun(self, what: str) -> None:
+        if not self._begun:
+            raise ResetNeeded(f"no episode has begun; call reset() before {what}.")
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -218,10 +196,7 @@ class StepLimit:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        if spec is not None:
-            kwargs = {name: _as_json(value) for name, value in spec.kwargs.items()}
-            spec = replace(spec, max_episode_steps=self.max_steps, kwargs=kwargs)
-        self._spec = spec
+        self._spec = spec and replace(spec, max_episode_steps=self.max_steps)
 
     @property
     def max_steps(self) -> int:
@@ -229,18 +204,7 @@ class StepLimit:
         return self._ants.max_steps
 
 
-def _as_json(value: Any) -> Any:
-    """Return an argument as JSON has it, in a form that the environments accept."""
-    if isinstance(value, (list, tuple)):
-        return [_as_json(entry) for entry in value]
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    if isinstance(value, (World, Task)):
-        return value.as_dict()
-    return getattr(value, "value", value)  # of an AutoresetMode
-
-
-class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
+class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
     """Base of the vector environments.
 
     With k ants in each world, environment number w * k + i is ant number i of world number w. Each
@@ -265,7 +229,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.single_action_space = Discrete(N_ACTIONS)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._begun, self._all = False, np.ones(num_envs, bool)
+        self._all = np.ones(num_envs, bool)
 
     def reset(
         self,
@@ -285,7 +249,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             Observations (num_envs, ...) and infos.
 
         Raises:
-            TypeError, ValueError: The seeds or the mask do not have these forms.
+            ValueError: The seeds or the mask do not have these forms.
             ResetNeeded: The first reset has a mask that leaves out worlds.
         """
         mask = self._mask(options)
@@ -301,20 +265,15 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         return self._ants.shown.show(facts["state"]), self._infos(facts, mask)
 
     def _mask(self, options: dict[str, Any] | None) -> np.ndarray:
-        mask, n = check_options(options, "reset_mask").get("reset_mask"), self.num_envs
+        mask = (options or {}).get("reset_mask")
         if mask is None:
             return self._all
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-            raise TypeError(f"reset_mask is {shown(mask)}; it must be a NumPy array of bool.")
-        if mask.shape != (n,) or not mask.any():
-            raise ValueError(
-                f"reset_mask is {shown(mask)}; it must have shape ({n},) and contain a True."
-            )
+        mask = as_array("reset_mask", mask, "b", (self.num_envs,))
         by_world = mask.reshape(self._n_worlds, -1)
         if (by_world.any(axis=1) != by_world.all(axis=1)).any():
             raise ValueError("reset_mask has only some ants of a world; give all or none of them.")
-        if not self._begun and not mask.all():
-            raise ResetNeeded("no episode has begun; call reset() without a reset_mask first.")
+        if not mask.all():
+            self._check_begun("a reset with a reset_mask")
         return mask
 
     def step(
@@ -347,8 +306,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
 
     def _waiting(self, method: str) -> np.ndarray:
         """Return the worlds at an episode's end; ResetNeeded if the method needs a reset before."""
-        if not self._begun:
-            raise ResetNeeded(f"no episode has begun; call reset() before {method}().")
+        self._check_begun(f"{method}()")
         over = self._over
         if self.autoreset_mode is AutoresetMode.DISABLED and over.any():
             number = over.argmax() * (self.num_envs // self._n_worlds)
@@ -438,8 +396,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         """
         if self.render_mode is None:
             return None
-        if not self._begun:
-            raise ResetNeeded("no episode has begun; call reset() before render().")
+        self._check_begun("render()")
         drawn = map(self._ants.draw, range(self._n_worlds))
         return tuple(picture for picture in drawn for _ in range(self.num_envs // self._n_worlds))
 
@@ -450,12 +407,9 @@ def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
         return [None] * n
     if isinstance(seed, (int, np.integer)):
         return range(int(seed), int(seed) + n)
-    if not isinstance(seed, (list, tuple, np.ndarray)) or np.shape(seed)[:1] != (n,):
+    if np.shape(seed) != (n,):
         raise ValueError(f"seed is {shown(seed)}; give a whole number, or a list of {n}.")
-    for entry in seed:
-        if entry is None:
-            continue
-        if not isinstance(entry, (int, np.integer)):
-            raise ValueError(f"a seed is {shown(entry)}; it must be a whole number, at least 0.")
-        seeding.np_random(int(entry))  # raises Gymnasium's error for negative seeds
-    return [None if entry is None else int(entry) for entry in seed]
+    seeds = [None if entry is None else operator.index(entry) for entry in seed]
+    for number in seeds:
+        seeding.np_random(number)  # raises Gymnasium's error for negative seeds
+    return seeds

@@ -56,6 +56,9 @@ class TrainingConfig(Settings, path="training"):
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
 
+    def __new__(cls, *values: Any, **named: Any) -> TrainingConfig:
+        return object.__new__(cls)  # further names are hyperparameters
+
     def __init__(
         self,
         learner: str,
@@ -103,13 +106,13 @@ class TrainingConfig(Settings, path="training"):
         """The learning rate at which decay ends."""
         return min(self.min_learning_rate, self.learning_rate)
 
-    def _changed(self, changes: Mapping[str, Any]) -> TrainingConfig:
-        """Take other names as hyperparameters; drop those of the learner before."""
+    def replace(self, /, **changes: Any) -> TrainingConfig:
+        """Return the configuration with changes; a new learner starts without hyperparameters."""
         common = [setting.name for setting in declared(TrainingConfig)]
         more = {name: value for name, value in changes.items() if name not in common}
         same = changes.get("learner", self.learner) == self.learner
         kept = dict(self.hyperparameters) if same else {}
-        changed = super()._changed({n: value for n, value in changes.items() if n in common})
+        changed = super().replace(**{n: value for n, value in changes.items() if n in common})
         return replace(changed, hyperparameters=tuple({**kept, **more}.items()))
 
     def next_learning_rate(self, rate: float) -> float:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import checked_whole
 from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 
 
@@ -87,7 +86,6 @@ def td_learner(
             only with `draws_next_action`. To try
             your learner, run `taichi-ants check FILE`.
     """
-    check_td_error(name, td_error)
     from taichi_ants.learners.memory import learn_by  # here, because it imports Taichi
 
     return Learner(
@@ -97,21 +95,3 @@ def td_learner(
         draws_next_action=draws_next_action,
         summary=summary,
     )
-
-
-def check_arguments(what: str, function: Any, wanted: list[str]) -> list[str]:
-    """Return the names of a `ti.func`'s arguments; AntsError if their number is not as wanted."""
-    # Taichi's own attribute; it would compile a plain function without its branches and loops.
-    if not getattr(function, "_is_taichi_function", False):
-        raise AntsError(f"{what} is not a Taichi function; decorate it with @ti.func.")
-    arguments = list(inspect.signature(function.func.func).parameters)
-    if len(arguments) != len(wanted):
-        listed = f"{', '.join(wanted[:-1])} and {wanted[-1]}"
-        raise AntsError(f"{what} has {len(arguments)} arguments; it needs {len(wanted)}: {listed}.")
-    return arguments
-
-
-def check_td_error(name: str, td_error: Any) -> None:
-    """Raise AntsError unless a TD error is a `ti.func` of six arguments."""
-    wanted = ["value", "reward", "discount", "next_values", "next_action", "epsilon"]
-    check_arguments(f"the TD error of {shown(name)}", td_error, wanted)

@@ -83,10 +83,7 @@ def discount_of(rates, terminated):
 
 @functools.cache
 def guarded(td_error: Any) -> Callable[..., object]:
-    """Return a TD error as a `ti.func` that returns an f32, or raises while it compiles.
-
-    Taichi's compiler would end the process if a result were not a float.
-    """
+    """Return a TD error as a `ti.func` that returns an f32, or raises while it compiles."""
 
     @ti.func
     def checked(value, reward, discount, next_values, next_action, epsilon):
@@ -116,17 +113,10 @@ def learn_by(td_error: Any) -> Callable[..., object]:
 
 def _as_f32(result: Any) -> object:
     """Return the result of a TD error as f32; called while a kernel compiles."""
-    if isinstance(result, (int, float)) and not isinstance(result, bool):
-        return ti.cast(float(result), ti.f32)
-    if not isinstance(result, Expr):
-        what = "nothing" if result is None else f"a value of the type {type(result).__name__}"
-    elif result.is_tensor():
-        what = "a vector (the largest of next_values is next_values.max())"
-    elif result.ptr.get_rvalue_type() not in (ti.f16, ti.f32, ti.f64):
-        what = f"a number of the type {result.ptr.get_rvalue_type().to_string()}"
-    else:
-        return ti.cast(result, ti.f32)
-    raise ti.TaichiCompilationError(f"it returns {what} where one float is needed")
+    if isinstance(result, Expr) and result.is_tensor():  # which would end the process
+        what = "a vector where one float is needed (the largest of them is next_values.max())"
+        raise ti.TaichiCompilationError(f"it returns {what}")
+    return ti.cast(result, ti.f32)
 
 
 # Taichi requires this attribute, with any value, of Python functions that kernels call.

@@ -134,7 +134,7 @@ def trail_follower(observation: str = "paper") -> ActionValues:
 
 
 # Policies that need no learning, by name: functions of the name of an observation.
-NAMED = {"random": random_policy, "trail_follower": trail_follower}
+NAMED = {"trail_follower": trail_follower, "random": random_policy}
 
 
 def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
@@ -157,10 +157,6 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
     return [LEFT]
 
 
-# Policies without learning, by the names that studies accept.
-WITHOUT_LEARNING = {"trail_follower": trail_follower, "random": random_policy}
-
-
 def frozen_policy(
     name_or_path: PathLike, observation: str = "paper", name: str = "policy"
 ) -> ActionValues:
@@ -173,11 +169,11 @@ def frozen_policy(
     """
     expect(name, name_or_path, str, os.PathLike)
     name_or_path = os.fspath(name_or_path)
-    if name_or_path in WITHOUT_LEARNING:
-        return WITHOUT_LEARNING[name_or_path](observation)
+    if name_or_path in NAMED:
+        return NAMED[name_or_path](observation)
     if not name_or_path.endswith(".npz"):
         raise AntsError(
-            f"{name} is {shown(name_or_path)}; it must be one of {', '.join(WITHOUT_LEARNING)}, or "
+            f"{name} is {shown(name_or_path)}; it must be one of {', '.join(NAMED)}, or "
             "the path of a policy file (.npz)."
         )
     policy = load_policy(name_or_path)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners, worlds
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect
 from taichi_ants.features import refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
@@ -33,6 +33,7 @@ SIZE, SIZES = 30, (10, 180)  # of a random world: default range along each axis;
 TASKS = {"paper": "the paper's", "foraging": "foraging", "queueing": "queueing"}
 LEARNS, FOLLOWS = "learn ", "file "  # prefixes of the names of policies
 BY_HAND = "by hand"
+_NEEDED = {"ants", "map", "policy", "seed", "settings", "size", "ticks", "world", "world_seed"}
 
 # With these settings, 64 ants learn to forage together in 60 episodes; see docs/foraging.md.
 _LEARNING: dict[str, Any] = {
@@ -127,21 +128,25 @@ class Choices:
             AntsError: A value is missing or not allowed.
         """
         expect("the choice", chosen, dict)
-        needed = ("ants", "map", "policy", "seed", "settings", "size", "ticks")
-        for name in (*needed, "world", "world_seed"):
-            if name not in chosen:
-                raise AntsError(f"{name} is missing; choose a value.")
+        if missing := sorted(_NEEDED - chosen.keys()):
+            raise AntsError(f"{missing[0]} is missing; choose a value.")
         world, policy, table, name = chosen["world"], chosen["policy"], None, ""
         check_one_of("the world", world, tuple(WORLDS))
         expect("policy", policy, str)
         if policy.startswith(LEARNS):
             name = policy.removeprefix(LEARNS)
             check_one_of("the learner", name, learners.names())
-        if world == "map":  # several lines, so it cannot be the name of a world or a file
-            expect("the map", chosen["map"], str)
-            if "\n" not in chosen["map"]:
-                raise AntsError(f"the map is {shown(chosen['map'])}; it must have several lines.")
-        settings = _settings(chosen["settings"], world, name)
+        expect("the map", chosen["map"], str)
+        # Several lines cannot be the name of a world or a file.
+        named = world if world != "map" else chosen["map"].rstrip() + "\n"
+        expect("settings", chosen["settings"], dict)
+        offered = {
+            field["path"]
+            for field in fields()
+            if field.get("world", world) == world and field.get("learner", "") in ("", name)
+        }
+        # Tasks also have settings that the form lacks.
+        settings = nested({k: v for k, v in chosen["settings"].items() if k in offered})
         task = Task.from_dict(settings.get("task", {}))
         if policy == BY_HAND:
             table = trail_follower(task.observation)
@@ -154,7 +159,7 @@ class Choices:
         training = {**_LEARNING, **settings.get("training", {})}
         ranges = {"ranges": [size] * 3} if worlds.is_drawn(world) else {}
         return Setup(
-            world=chosen["map"] if world == "map" else world,
+            world=named,
             task=task,
             policy=TrainingConfig(name, **training) if table is None else table,
             ants=chosen["ants"],
@@ -192,28 +197,3 @@ class Choices:
             "seed": setup.seed,
             "ticks": setup.ticks_per_episode,
         }
-
-
-def _settings(values: Any, world: str, learner: str) -> dict[str, Any]:
-    """Return a page's settings by group; raise AntsError if the form lacks one of them."""
-    expect("settings", values, dict)
-    # Tasks have defaults of settings that the form lacks.
-    lacking = {
-        setting.path: setting.default
-        for setting in all_of(Task)
-        if setting.is_text or setting.path.startswith(f"{Labour.path}.")
-    }
-    values = {
-        path: value
-        for path, value in values.items()
-        if path not in lacking or value != lacking[path]
-    }
-    offered = {
-        field["path"]
-        for field in fields()
-        if field.get("world", world) == world and field.get("learner", "") in ("", learner)
-    }
-    for path in values:
-        if path not in offered:
-            raise AntsError(f"{shown(path)} is not a setting of this form; leave it out.")
-    return nested(values)

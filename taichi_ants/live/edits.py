@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
+import numpy as np
+
 from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
@@ -40,7 +42,8 @@ def values(interventions: Interventions) -> dict[str, Value]:
     - evaporation: 1 if trails evaporate, else 0.
     """
     colony, pheromone = interventions.colony, interventions.colony.pheromones[0]
-    values = {"ants": Value(max(interventions.living, 1), 1, colony.capacity, 1, "ants")}
+    living = int(np.count_nonzero(colony.living[0]))
+    values = {"ants": Value(max(living, 1), 1, colony.capacity, 1, "ants")}
     if colony.task.choice.needs_table:
         values["epsilon"] = Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon")
     if colony.sharing != "frozen":
@@ -108,11 +111,4 @@ def checked(edit: object, interventions: Interventions) -> Intervention:
     else:
         flat = [language.flat_index(colony.grid, cell) for cell in cells]
     # `Clear` stands for any intervention with cells.
-    intervention = replace(cast(language.Clear, intervention), cells=flat)
-    places_queen = intervention.facts().get("place", {}).get("what") == "queen"
-    if places_queen and not interventions.is_empty(flat[0]):
-        cell = tuple(colony.grid.cells(flat[0]).tolist())
-        raise AntsError(
-            f"the queen cannot move to cell {cell}, because it is not empty; choose an empty cell."
-        )
-    return intervention
+    return replace(cast(language.Clear, intervention), cells=flat)

@@ -1,14 +1,16 @@
-"""Files that pages can export from a session, and worker processes that make or replay them."""
+"""Files that pages can export from a session, and jobs: replays, and files that take long.
+
+A job has the attributes `done` and `total`, in steps or ticks, and `page`, the page that asked for
+it, if any. Its `result` is a session, a file or a message; None before the end.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -19,7 +21,7 @@ from taichi_ants.viewer import Recording, page
 Progress = Callable[[int], None]  # called with the number of ticks that have passed
 
 _PROGRESS_EVERY = 0.1  # seconds
-_SLICE = 0.05  # seconds of undoing per turn of the server
+_SLICE = 0.05  # seconds of a replay per turn of the server
 
 
 def recording(log: Log, most_frames: int = 1000, progress: Progress | None = None) -> Recording:
@@ -45,8 +47,8 @@ def _snapshots(log: Log, most: int, progress: Progress | None) -> Iterator[tuple
             progress(session.ticks)
 
 
-LOAD = "load"  # pages' name for the replay of an uploaded file, and for undoing
-# Pages' names of files, file names, and the functions that make them: at once, or by a replay.
+LOAD = "load"  # pages' name for a replay: of an uploaded file, or to undo a change
+# Pages' names of files, file names, and the functions that make them: at once, or by an `Export`.
 QUICK: dict[str, tuple[str, Callable[[Session], bytes]]] = {
     "session": ("session.npz", Session.to_bytes),
     "policy": ("policy.npz", Session.policy_bytes),
@@ -58,21 +60,22 @@ SLOW: dict[str, tuple[str, Callable[[Log, Progress], bytes]]] = {
 }
 
 
-class UndoJob:
-    """The replay of a session without its last change; it has the attributes of `WorkerJob`."""
+class Replay:
+    """A replay, in slices: iterates over `sessions`, the last of which is the result."""
 
     page = None
 
-    def __init__(self, session: Session) -> None:
-        self._replay, self._last = session.undone(), session
-        self.done, (self.total, _) = 0, session.edits[session.changes[-1]]
+    def __init__(self, sessions: Iterator[Session], total: int, undoes: bool = False) -> None:
+        self._sessions, self.total, self.undoes = sessions, total, undoes
+        self.done = 0
+        self._last: Session | None = None
         self.result: Session | str | None = None
 
     def proceed(self) -> None:
         """Continue for a moment; AntsError and MemoryError become messages in `result`."""
         until = time.monotonic() + _SLICE
         try:
-            for session in self._replay:
+            for session in self._sessions:
                 self._last, self.done = session, session.steps
                 if time.monotonic() > until:
                     return
@@ -80,62 +83,47 @@ class UndoJob:
         except AntsError as error:
             self.result = str(error)
         except MemoryError:
-            self.result = "undoing needs more memory than is available."
+            self.result = "a replay needs more memory than is available."
 
     def cancel(self) -> None:
-        """Do nothing, because the session has not changed."""
+        """Do nothing, because the session of the server has not changed."""
 
 
-class WorkerJob:
-    """A worker process that makes a file of `SLOW`, or replays a session (`LOAD`).
+class Export:
+    """A worker process that makes a file of `SLOW`, while the session continues.
 
-    `content` is a session file, `total` its number of ticks. The process calls `prepare` first, for
-    example to load a plugin. `page` is the page that asked for it.
-
-    Attributes:
-        done: The number of ticks that have been replayed.
-        result: The result, or a message if there is none; None before the end.
+    The process calls `prepare` first, for example to load a plugin.
     """
 
+    undoes = False
+
     def __init__(
-        self,
-        kind: str,
-        content: bytes,
-        total: int,
-        prepare: Callable[[], None] | None,
-        page: Any = None,
+        self, kind: str, session: Session, prepare: Callable[[], None] | None, page: Any = None
     ) -> None:
-        self._kind, self.done, self.total, self.page = kind, 0, total, page
-        self.result: bytes | str | Session | None = None
-        self._cancelled = False
+        self.done, self.total, self.page = 0, session.ticks, page
+        self.result: bytes | str | None = None
         context = multiprocessing.get_context("spawn")
         self._answers, answers = context.Pipe(duplex=False)
-        arguments = (kind, content, prepare, answers)
+        arguments = (kind, session.to_bytes(), prepare, answers)
         self._process = context.Process(target=_make, args=arguments, daemon=True)
-        threading.Thread(target=self._run, args=(answers,), daemon=True).start()
+        self._process.start()
+        answers.close()  # so that `recv` raises EOFError when the process ends
 
     def proceed(self) -> None:
-        """Do nothing, because the process continues by itself."""
+        """Read what the process has sent: numbers of ticks, then the result."""
+        try:
+            while self.result is None and self._answers.poll():
+                answer = self._answers.recv()
+                if isinstance(answer, int):
+                    self.done = answer
+                else:
+                    self.result = answer
+        except (EOFError, OSError):
+            self.result = "the worker process has ended early, perhaps for lack of memory."
 
     def cancel(self) -> None:
         """End the process now."""
-        self._cancelled = True
-        if self._process.pid is not None:
-            self._process.terminate()
-
-    def _run(self, answers: Connection) -> None:
-        answer: bytes | str | int | Session = 0
-        with self._answers, suppress(EOFError, OSError):  # for example if memory is exhausted
-            self._process.start()
-            answers.close()  # so that `recv` raises EOFError when the process ends
-            if self._cancelled:
-                self._process.terminate()
-            while isinstance(answer := self._answers.recv(), int):
-                self.done = answer
-        if isinstance(answer, int):
-            answer = "the worker process has ended early, perhaps for lack of memory."
-        faulty = isinstance(answer, str) and self._kind == LOAD
-        self.result = _of_page(answer) if faulty else answer
+        self._process.terminate()
 
 
 def _make(
@@ -156,25 +144,6 @@ def _make(
     try:
         if prepare is not None:
             prepare()
-        log = Log.from_bytes(content)
-        if kind == LOAD:
-            for session in Session.replay(log):
-                progress(session.steps)
-            answers.send(session)
-        else:
-            answers.send(SLOW[kind][1](log, progress))
+        answers.send(SLOW[kind][1](Log.read("the session", content), progress))
     except AntsError as error:
         answers.send(str(error))
-
-
-def uploaded(content: bytes) -> Log:
-    """Return the log in an uploaded file; raise AntsError with advice for users of the page."""
-    try:
-        return Log.from_bytes(content)
-    except AntsError as error:
-        raise AntsError(_of_page(error)) from None
-
-
-def _of_page(fault: object) -> str:
-    what = str(fault).partition("; ")[0].rstrip(".").replace("'the loaded file'", "the loaded file")
-    return f"{what}; load a file that Save session has written."

@@ -5,8 +5,8 @@ open page; a socket requires the server's own page and its token. Pages send req
 `SessionServer._do`; the server sends JSON messages and frames, see `taichi_ants.viewer.frames`.
 
 One thread serves the sockets. Another one, which calls `SessionServer.run`, owns the session.
-Requests pass through a queue to it, and messages for pages return to the socket thread. Further
-threads check uploaded files, and worker processes replay them, see `exports.WorkerJob`.
+Requests pass through a queue to it, and messages for pages return to the socket thread. What takes
+long is a job, see `taichi_ants.live.exports`.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, InvalidStateError
 from functools import cache, partial
 from importlib import resources
 from typing import TYPE_CHECKING, Any
@@ -30,7 +31,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from taichi_ants.errors import AntsError, imported
 from taichi_ants.live.choices import Choices
-from taichi_ants.live.exports import LOAD, QUICK, SLOW, UndoJob, WorkerJob, uploaded
+from taichi_ants.live.exports import LOAD, QUICK, SLOW, Export, Replay
 from taichi_ants.live.session import Log, Session
 from taichi_ants.viewer.page import assemble
 
@@ -62,7 +63,7 @@ _QUIET.propagate = False
 
 
 # Requests to refuse during a replay: they would be lost, or change the session if it is cancelled.
-_CHANGES = ("play", "step", "edit", "undo", "back", "begin", "restart")
+_CHANGES = ("play", "step", "edit", "undo", "load", "back", "begin", "restart")
 
 _HEADERS = {
     "Allow": "GET, HEAD",
@@ -156,9 +157,8 @@ class SessionServer:
         self._shown = secrets.token_hex(8)  # identifies the session for pages that reconnect
         self._pages: set[Page] = set()
         self._joined = 0  # sockets, including those that have not received a session yet
-        # The page, its request as a function, and a future for the result.
-        self._requests: queue.Queue[tuple[Page, Callable[[], None], asyncio.Future[None]]]
-        self._requests = queue.Queue()
+        # The page, its request as a function, and a future for the end of the request.
+        self._requests: queue.Queue[tuple[Page, Callable[[], object], Future[None]]] = queue.Queue()
         self._loop = asyncio.new_event_loop()
         self._over, self._leave = threading.Event(), asyncio.Event()
         self._ticks_due, self._frame_steps, self._due = 0.0, 1.0, 0.0  # see _advance_frame
@@ -166,8 +166,7 @@ class SessionServer:
         self._previous: Session | None = None  # the session before the present one
         self._undone: tuple[int, int] | None = None  # its steps and edits, after an undo
         self._stroke: tuple[Page, float] | None = None  # page and number of the last edit's stroke
-        self._jobs: dict[str, WorkerJob | UndoJob] = {}  # running job: LOAD, or a file of SLOW
-        self._loaded: Session | None = None  # from a worker process, before its first step here
+        self._jobs: dict[str, Replay | Export] = {}  # running job: LOAD, or a file of SLOW
         self._compiles = False  # whether the first step of a session is running
         self._next_state = 0.0  # time of the next state message
 
@@ -217,6 +216,11 @@ class SessionServer:
     def _turn(self) -> None:
         """Advance by a frame if one is due, and handle requests."""
         runs = self._runs and bool(self._pages)  # pause if no page is open
+        now = time.monotonic()
+        if now >= self._next_state:
+            interval = _PROGRESS_EVERY if self._jobs else _STATE_EVERY if runs else math.inf
+            self._next_state = now + interval
+            self._send(self._state())
         for kind, job in [*self._jobs.items()]:
             job.proceed()
             if job.result is not None:
@@ -224,25 +228,19 @@ class SessionServer:
         if runs and time.monotonic() >= self._due:
             self._advance_frame()
         now = time.monotonic()
-        if now >= self._next_state:
-            interval = _PROGRESS_EVERY if self._jobs else _STATE_EVERY if runs else math.inf
-            self._next_state = now + interval
-            self._send(self._state())
-        undoes = isinstance(self._jobs.get(LOAD), UndoJob)
-        due = now if undoes else self._due if runs else math.inf
+        due = now if LOAD in self._jobs else self._due if runs else math.inf
         wait = min(due - now, self._next_state - now, _LONGEST_WAIT)
         with contextlib.suppress(queue.Empty):
             for _ in range(1 + len(self._pages)):  # about one request per page
                 self._answer(*self._requests.get(timeout=max(wait, _PAUSE)))
                 wait = 0.0
 
-    def _finish_job(self, kind: str, job: WorkerJob | UndoJob) -> None:
+    def _finish_job(self, kind: str, job: Replay | Export) -> None:
         """Begin the finished session, send the finished file to its page, or send an error."""
         del self._jobs[kind]
         self._next_state = 0.0
         if isinstance(job.result, Session):
-            self._begin(job.result, undoes=isinstance(job, UndoJob))
-            self._loaded = job.result if isinstance(job, WorkerJob) else None
+            self._begin(job.result, undoes=job.undoes)
         elif isinstance(job.result, bytes):
             self._send(_message("file", name=SLOW[kind][0]), job.result, to=job.page)
         else:
@@ -282,8 +280,8 @@ class SessionServer:
 
     def _advance(self, ticks: int) -> None:
         """Advance by ticks, and show them; the first call compiles kernels, which takes seconds."""
-        if self.session.steps == 0 or self.session is self._loaded:
-            self._compiles, self._loaded = True, None
+        self._compiles = self.session.steps == 0
+        if self._compiles:
             self._send(self._state())
             time.sleep(_PAUSE)  # so that the socket thread sends this state first
         try:
@@ -292,7 +290,7 @@ class SessionServer:
             if self._compiles:
                 self._compiles, self._next_state = False, 0.0  # send the new state at once
 
-    def _answer(self, page: Page, act: Callable[[], None], answered: asyncio.Future[None]) -> None:
+    def _answer(self, page: Page, act: Callable[[], object], answered: Future[None]) -> None:
         """Perform a request or send its page an error; then send the state to all pages soon."""
         refused = None
         try:
@@ -303,84 +301,66 @@ class SessionServer:
             no_memory = isinstance(error, MemoryError)
             words = "this needs more memory than is available." if no_memory else str(error)
             self._send(_message("error", words=words), to=page)
-
-        def answer() -> None:
-            if not answered.done():  # it is done if the page has disconnected
-                answered.set_exception(refused) if refused else answered.set_result(None)
-
-        self._post(answer)
+        with contextlib.suppress(InvalidStateError):  # the page has disconnected
+            answered.set_exception(refused) if refused else answered.set_result(None)
         self._next_state = min(self._next_state, time.monotonic() + 1 / FRAMES_A_SECOND)
 
-    def _do(self, page: Page, request: dict[str, Any]) -> None:
-        """Perform a JSON request of a page."""
-        if request["do"] in _CHANGES:
-            self._check_free()
-        match request["do"]:
-            case "play":
+    def _do(self, page: Page, request: Any) -> None:
+        """Perform a JSON request of a page; raise Closed if no live page sends it."""
+        if LOAD in self._jobs and isinstance(request, dict) and request.get("do") in _CHANGES:
+            raise AntsError("a session is being replayed; wait until it ends, or cancel it.")
+        match request:
+            case {"do": "play"}:
                 self.playing, self._due = True, time.monotonic()
-            case "pause":
+            case {"do": "pause"}:
                 self.playing = False
-            case "step":  # {"ticks": 1 to 100}
+            case {"do": "step", "ticks": int(ticks)} if 1 <= ticks <= 100:
                 self.playing = False
-                for _ in range(int(_number(request, "ticks", 1, 100))):
+                for _ in range(ticks):
                     self._advance(1)
-            case "speed":  # {"value": ticks/s, 1 to FASTEST}
-                self.speed, self._due = _number(request, "value", 1, FASTEST), time.monotonic()
-            case "edit":  # {"edit": see `edits`, "stroke": a number, equal for edits of one stroke}
-                if not isinstance(request.get("edit"), dict):
-                    raise Closed("an edit has to be an object")
-                stroke = page, _number(request, "stroke", 0, 2**53)
-                self._show(self.session.apply(request["edit"], goes_on=stroke == self._stroke))
+            case {"do": "speed", "value": int(speed) | float(speed)} if 1 <= speed <= FASTEST:
+                self.speed, self._due = float(speed), time.monotonic()  # ticks/s
+            case {"do": "edit", "edit": dict(edit), "stroke": int(number)}:
+                # See `edits`; the number is equal for edits of one stroke.
+                stroke = page, number
+                self._show(self.session.apply(edit, goes_on=stroke == self._stroke))
                 self._stroke = stroke
-            case "undo":
-                self._jobs[LOAD] = UndoJob(self.session)
-            case "back":  # return to the session before the present one
+            case {"do": "undo"}:
+                self._jobs[LOAD] = Replay(*self.session.undone(), undoes=True)
+            case {"do": "load", "content": bytes(content)}:  # which is a binary message
+                log = Log.read("the loaded file", content)
+                self._jobs[LOAD] = Replay(Session.replay(log), log.steps)
+            case {"do": "back"}:  # return to the session before the present one
                 if self._previous is None:
                     raise AntsError(
                         "there is no session before this one to return to; continue with this one."
                     )
                 self._begin(self._previous, comes_back=True)
-            case "begin":  # {"chosen": see `Choices.setup`}
-                self._begin(Session(self.choices.setup(request.get("chosen"))))
-            case "restart":
+            case {"do": "begin", "chosen": chosen}:
+                self._begin(Session(self.choices.setup(chosen)))
+            case {"do": "restart"}:
                 self._begin(Session(self.session.setup))
-            case "export":  # {"kind": of `QUICK` or `SLOW`}
-                self._export(page, str(request.get("kind")))
-            case "cancel":  # {"kind": LOAD or of `SLOW`}; it may have ended already
-                kind = str(request.get("kind"))
+            case {"do": "export", "kind": str(kind)} if kind in QUICK:
+                name, make = QUICK[kind]
+                self._send(_message("file", name=name), make(self.session), to=page)
+            case {"do": "export", "kind": str(kind)} if kind in SLOW:
+                if self._jobs.keys() & SLOW.keys():
+                    raise AntsError("another file is being made; wait for it, or cancel it.")
+                self._jobs[kind] = Export(kind, self.session, self._prepare, page)
+            case {"do": "cancel", "kind": str(kind)}:  # it may have ended already
                 if kind in self._jobs:
                     self._jobs.pop(kind).cancel()
                     self._send(_message("cancelled", kind=kind))
-            case "quit":
+            case {"do": "quit"}:
                 self.end()
             case _:
-                raise Closed("this request does not exist")
-
-    def _check_free(self) -> None:
-        if LOAD in self._jobs:
-            raise AntsError("a session is being replayed; wait until it ends, or cancel it.")
-
-    def _load(self, log: Log, content: bytes) -> None:
-        self._check_free()
-        self._jobs[LOAD] = WorkerJob(LOAD, content, log.steps, self._prepare)
+                raise Closed("the live page never sends such a request")
 
     def _forget(self, page: Page) -> None:
         """Cancel the files that a disconnected page has asked for."""
         for kind, job in [*self._jobs.items()]:
             if job.page is page:
                 self._jobs.pop(kind).cancel()
-
-    def _export(self, page: Page, kind: str) -> None:
-        if kind in QUICK:
-            name, make = QUICK[kind]
-            self._send(_message("file", name=name), make(self.session), to=page)
-        elif kind not in SLOW:
-            raise Closed("this kind of file does not exist")
-        elif self._jobs.keys() & SLOW.keys():
-            raise AntsError("another file is being made; wait for it, or cancel it.")
-        else:
-            content, ticks = self.session.to_bytes(), self.session.ticks
-            self._jobs[kind] = WorkerJob(kind, content, ticks, self._prepare, page)
 
     def _begin(self, session: Session, undoes: bool = False, comes_back: bool = False) -> None:
         """Replace the session; pages can return to the previous one with the request "back".
@@ -416,11 +396,11 @@ class SessionServer:
     def _show(self, frame: bytes) -> None:
         """Send a frame to all pages except those that are behind."""
         new_names = self.session.new_state_names()
+        if new_names:
+            self._send(_message("names", names=new_names))
 
         def show() -> None:
             for page in self._pages:
-                if new_names:
-                    page.send(_message("names", names=new_names))
                 page.show(frame)
 
         self._post(show)
@@ -520,14 +500,12 @@ class SessionServer:
         try:
             await self._request(page, partial(self._send_whole, page))
             async for message in connection:
-                if isinstance(message, bytes):
-                    await self._upload(page, message)
-                    continue
-                request = _read(message)
-                if request["do"] != "seen":
-                    await self._request(page, partial(self._do, page, request))
-                elif page.acknowledge(int(_number(request, "frames", 0, 1000))):
-                    await self._request(page, partial(self._send_whole, page, begins=False))
+                match request := _read(message):
+                    case {"do": "seen", "frames": int(frames)} if 0 <= frames <= 1000:
+                        if page.acknowledge(frames):
+                            await self._request(page, partial(self._send_whole, page, begins=False))
+                    case _:
+                        await self._request(page, partial(self._do, page, request))
         except Closed as error:
             await connection.close(1008, str(error))
         except ConnectionClosed:
@@ -535,46 +513,23 @@ class SessionServer:
         finally:
             self._joined -= 1
             self._pages.discard(page)
-            self._requests.put((page, partial(self._forget, page), self._loop.create_future()))
+            self._requests.put((page, partial(self._forget, page), Future()))
 
-    async def _upload(self, page: Page, content: bytes) -> None:
-        """Check an uploaded file in a thread, so that other pages do not wait."""
-        try:
-            log = await asyncio.to_thread(uploaded, content)
-        except AntsError as error:
-            page.send(_message("error", words=str(error)))
-        else:
-            await self._request(page, partial(self._load, log, content))
-
-    async def _request(self, page: Page, act: Callable[[], None]) -> None:
-        answered = self._loop.create_future()
+    async def _request(self, page: Page, act: Callable[[], object]) -> None:
+        """Wait until the thread of the session has performed a request of a page."""
+        answered: Future[None] = Future()
         self._requests.put((page, act, answered))
-        await answered
+        await asyncio.wrap_future(answered)
 
 
 def _message(kind: str, /, **facts: Any) -> str:
     return json.dumps({"say": kind, **facts}, separators=(",", ":"))
 
 
-def _read(message: str) -> dict[str, Any]:
-    if len(message) > _MOST_TEXT:
-        raise Closed("the message is too long")
-    try:
-        request = json.loads(message, parse_constant=_refuse)
-    except (ValueError, RecursionError):
-        raise Closed("the message is not JSON") from None
-    if not isinstance(request, dict) or not isinstance(request.get("do"), str):
-        raise Closed('a request has to be an object with a "do"')
-    return request
-
-
-def _refuse(name: str) -> None:
-    raise ValueError(f"{name} is not a number")
-
-
-def _number(request: dict[str, Any], name: str, least: float, most: float) -> float:
-    """Return a number of a request; raise Closed if the live page never sends it."""
-    value = request.get(name)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
-        raise Closed(f"{name} has to be a number from {least} to {most}")
-    return value
+def _read(message: str | bytes) -> Any:
+    """Return the request in a message of a page, None if it is too long or not JSON."""
+    if isinstance(message, bytes):
+        return {"do": "load", "content": message}
+    with contextlib.suppress(ValueError, RecursionError):
+        return json.loads(message) if len(message) <= _MOST_TEXT else None
+    return None

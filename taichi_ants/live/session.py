@@ -21,13 +21,10 @@ from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.files.archives import Kind
 from taichi_ants.learners.policies import save_policy
 from taichi_ants.live import edits
-from taichi_ants.live.setup import Setup
+from taichi_ants.live.setup import Setup, check_most
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import Recorder
 
-MOST_TICKS = 1_000_000_000
-MOST_EDITS = 10_000
-MOST_CELLS = 400_000  # cells in all edits together
 # Sessions within these limits fit into `most`, so reading a file takes little time and memory.
 _WRITER = "Session.save, or Save session on its page,"
 KIND = Kind("session", 4, _WRITER, most=5_000_000, most_lists=100_000)
@@ -42,15 +39,6 @@ def cells_of(edit: Any) -> int:
     settings = list(edit.values()) if isinstance(edit, dict) else []
     lists = [setting.get("cells") for setting in settings if isinstance(setting, dict)]
     return sum(len(cells) for cells in lists if isinstance(cells, list))
-
-
-def check_room(n_edits: int, n_cells: int) -> None:
-    """Raise AntsError if a session has too many edits, or too many cells in them."""
-    if n_edits > MOST_EDITS or n_cells > MOST_CELLS:
-        raise AntsError(
-            f"the session has {n_edits} edits of {n_cells} cells, but at most {MOST_EDITS} edits "
-            f"of {MOST_CELLS} cells are allowed; begin another session."
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +69,10 @@ class Log:
         """Return the log in a file; arguments and errors are those of `archives.read`."""
         with KIND.reading(path, content) as (arrays, facts):
             expect("state", facts["state"], str)
-            steps = checked_whole("steps", facts["steps"], 0, MOST_TICKS)
+            steps = checked_whole("steps", facts["steps"], 0)
+            check_most("ticks", steps)
+            check_most("edits", len(facts["edits"]))
+            check_most("cells in all edits", sum(cells_of(edit) for _, edit in facts["edits"]))
             edits, before = [], 0
             for at, edit in facts["edits"]:
                 before = checked_whole("steps", at, before, steps)
@@ -95,14 +86,7 @@ class Log:
                 checked_whole("ticks", facts["ticks"], 0, steps),
                 *(facts["state"], str(path), tuple(changes)),
             )
-        check_room(len(edits), sum(cells_of(edit) for _, edit in edits))
-        log.setup.check_size()
         return log
-
-    @classmethod
-    def from_bytes(cls, content: bytes) -> Log:
-        """Return the log in the bytes of an uploaded file; raises as `read` does."""
-        return cls.read("the loaded file", content)
 
 
 class _Snapshot(NamedTuple):
@@ -131,7 +115,8 @@ class Session:
         self.interventions = Interventions(self.colony)
         self.edits: list[tuple[int, edits.Edit]] = []
         self.changes: list[int] = []
-        self._cells = self._episodes = 0  # in all edits: cells, and episodes that they begin
+        self._cells = 0  # in all edits
+        self._begun = 0  # episodes that began after one had ended
         self._snapshots: list[_Snapshot] = []
         self._spent = 0.0  # seconds of simulation so far
         self.interventions.length = self._length
@@ -156,7 +141,7 @@ class Session:
     @property
     def steps(self) -> int:
         """The number of ticks, plus the number of episodes that began after one had ended."""
-        return self.ticks + self.colony.episode - self._episodes
+        return self.ticks + self._begun
 
     @property
     def ended(self) -> bool:
@@ -201,11 +186,11 @@ class Session:
         progress = self._recorder.progress
         if self.ended:
             progress.note(ended=True)
+            self._begun += 1  # first, because Ctrl-C during a launch raises an error after it
             self.interventions.begin_episode()
             return None
         n = min(n, self._length - self.colony.ticks if self._length else n)
-        if self.ticks + n > MOST_TICKS:
-            raise AntsError(f"a session has at most {MOST_TICKS} ticks; begin another one.")
+        check_most("ticks", self.ticks + n)
         began = time.perf_counter()
         try:
             frame = tick(n)
@@ -227,26 +212,25 @@ class Session:
     def _do(self, edit: object, goes_on: bool = False) -> None:
         intervention = edits.checked(edit, self.interventions)
         plain = intervention.facts()
-        check_room(len(self.edits) + 1, self._cells + cells_of(plain))
+        check_most("edits", len(self.edits) + 1)
+        check_most("cells in all edits", self._cells + cells_of(plain))
         begins = not (goes_on and self.changes)
         if begins:
             self._take_snapshot()
         began = time.perf_counter()
         if "episode" in plain:
             self._recorder.progress.note(ended=True)
-        known = len(self.edits), len(self.changes), self._cells, self._episodes
         # Recorded first, because Ctrl-C during a launch raises an error after it.
         if begins:
             self.changes.append(len(self.edits))
         self.edits.append((self.steps, plain))
-        self._cells += cells_of(plain)
-        self._episodes += "episode" in plain
         try:
-            intervention.apply(self.interventions)
+            self.interventions.apply(intervention)
         except AntsError:
-            del self.edits[known[0] :], self.changes[known[1] :]
-            self._cells, self._episodes = known[2:]
+            self.edits.pop()
+            del self.changes[len(self.changes) - begins :]
             raise
+        self._cells += cells_of(plain)
         self._spent += time.perf_counter() - began
 
     def _take_snapshot(self) -> None:
@@ -329,10 +313,10 @@ class Session:
         mine, others = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
         return mine == others and self.interventions.state() == other.interventions.state()
 
-    def undone(self) -> Iterator[Session]:
-        """Return an iterator like `replay` that ends before the last change; it uses a snapshot.
+    def undone(self) -> tuple[Iterator[Session], int]:
+        """Return an iterator like `replay` that ends before the last change, and its steps then.
 
-        This session does not change. Raises AntsError if it has no changes.
+        It uses a snapshot; this session does not change. Raises AntsError if it has no changes.
         """
         if not self.changes:
             raise AntsError("there is nothing to undo: this session has no interventions.")
@@ -345,7 +329,7 @@ class Session:
         else:
             session = Session(self.setup)
         steps, _ = self.edits[last]
-        return session._follow(self.edits[len(session.edits) : last], steps, changes)
+        return session._follow(self.edits[len(session.edits) : last], steps, changes), steps
 
     @classmethod
     def snapshots(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:

@@ -14,7 +14,6 @@ import numpy as np
 from taichi_ants.errors import AntsError
 from taichi_ants.measures.measure import COUNTS, Measure
 from taichi_ants.measures.paths import shortest_path
-from taichi_ants.records import Snapshot
 from taichi_ants.task.constants import OBSTACLE
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL

@@ -9,7 +9,7 @@ early and late measures never share an episode.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -31,6 +31,7 @@ _WINDOWS = {
     "all": (slice(None), "all episodes", 1),
 }
 _COLONY_COUNTS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
+_of_run = partial(Measure, of=RUN)
 # The outcome of a `RunPoint` or a `ColonyPoint`: arrays (..., episodes or rollouts) by name.
 Outcome = Mapping[str, np.ndarray]
 Counts = Mapping[str, Any]
@@ -116,15 +117,15 @@ def _fluctuation(measure: Measure, episodes: slice, run: Run) -> np.ndarray:
 
 def _windows(measure: Measure, words: str) -> Iterator[Measure]:
     """Yield the measures of runs of lone ants for a measure of counts."""
-    name, unit, of_run = measure.name, measure.unit, partial(Measure, of=RUN)
+    name, unit = measure.name, measure.unit
     for window, (episodes, when, least) in _WINDOWS.items():
         mean = partial(_mean, measure, "training", episodes)
-        yield of_run(f"{name}_{window}", mean, unit, f"mean {words} of {when}", episodes=least)
+        yield _of_run(f"{name}_{window}", mean, unit, f"mean {words} of {when}", episodes=least)
         changes = f"fluctuation of the {words} from episode to episode in {when}"
         full, of_window = f"{name}_fluctuation_{window}", partial(_fluctuation, measure, episodes)
-        yield of_run(full, of_window, unit, changes, episodes=max(2, least))
+        yield _of_run(full, of_window, unit, changes, episodes=max(2, least))
     mean = partial(_mean, measure, "evaluation", slice(None))
-    yield of_run(f"greedy_{name}", mean, unit, f"mean {words} of the greedy rollouts")
+    yield _of_run(f"greedy_{name}", mean, unit, f"mean {words} of the greedy rollouts")
 
 
 def _repeats(run: Run) -> np.ndarray:
@@ -148,12 +149,6 @@ def _blocked(run: Run) -> np.ndarray:
     return run.evaluation["blocked"].sum(axis=-1) / np.where(moves > 0, moves, np.nan)
 
 
-def _measure(
-    name: str, function: Callable[[Run], Any], summary: str, unit: str = "", episodes: int = 0
-) -> Measure:
-    return Measure(name, function, unit, summary, RUN, episodes=episodes)
-
-
 _LONE = (
     *_windows(Measure("return", lambda counts: counts["returns"], "reward"), "return"),
     *_windows(Measure("steps", lambda counts: counts["ticks"], "steps"), "length"),
@@ -161,25 +156,24 @@ _LONE = (
         Measure("deliveries", lambda counts: counts["deliveries"], "deliveries per episode"),
         "deliveries",
     ),
-    _measure("shortest_episode", lambda run: run.training["ticks"].min(axis=-1).astype(float),
-             "length of the shortest training episode", "steps", 1),
-    _measure("improved", _improved, "whether the last 50 episodes return more than the first 50",
-             "share of runs", 2 * WINDOW),
-    _measure("greedy_repeats", _repeats,
-             "whether all greedy rollouts of a run are equal in return and length",
-             "share of runs"),
+    _of_run("shortest_episode", lambda run: run.training["ticks"].min(axis=-1).astype(float),
+            "steps", "length of the shortest training episode", episodes=1),
+    _of_run("improved", _improved, "share of runs",
+            "whether the last 50 episodes return more than the first 50", episodes=2 * WINDOW),
+    _of_run("greedy_repeats", _repeats, "share of runs",
+            "whether all greedy rollouts of a run are equal in return and length"),
 )  # fmt: skip
 _COLONY = (
-    _measure("deliveries", partial(_per_1000_ticks, "deliveries"), "deliveries per 1000 ticks"),
-    _measure("per_ant", lambda run: _per_1000_ticks("deliveries", run) / run.ants,
-             "deliveries per ant and 1000 ticks"),
-    _measure("first_delivery", lambda run: first_delivery(run.evaluation).mean(axis=-1),
-             "ticks to the first delivery"),
-    _measure("no_delivery_rate", lambda run: (run.evaluation["first_delivery"] < 0).mean(axis=-1),
-             "share of episodes without a delivery"),
-    _measure("blocked", _blocked, "share of blocked moves"),
-    _measure("reward", lambda run: _per_1000_ticks("returns", run) / run.ants,
-             "reward per ant and 1000 ticks"),
+    _of_run("deliveries", partial(_per_1000_ticks, "deliveries"), "", "deliveries per 1000 ticks"),
+    _of_run("per_ant", lambda run: _per_1000_ticks("deliveries", run) / run.ants, "",
+            "deliveries per ant and 1000 ticks"),
+    _of_run("first_delivery", lambda run: first_delivery(run.evaluation).mean(axis=-1), "",
+            "ticks to the first delivery"),
+    _of_run("no_delivery_rate", lambda run: (run.evaluation["first_delivery"] < 0).mean(axis=-1),
+            "", "share of episodes without a delivery"),
+    _of_run("blocked", _blocked, "", "share of blocked moves"),
+    _of_run("reward", lambda run: _per_1000_ticks("returns", run) / run.ants, "",
+            "reward per ant and 1000 ticks"),
 )  # fmt: skip
 LONE = {measure.name: measure for measure in _LONE}
 COLONY = {measure.name: measure for measure in _COLONY}
@@ -196,13 +190,13 @@ def of_runs(kind: str, name: str) -> Measure:
         return FINISHED[kind][name]
     if isinstance(name, str) and name.partition(".")[0] in _registered(kind):
         return get(name)
-    for measure in map(get, MEASURES.names()):
-        windows = _windows(measure, measure.name.replace("_", " "))
-        found = next((window for window in windows if window.name == name), None)
-        if kind == "runs" and measure.of == COUNTS and found:
-            episode = dict.fromkeys(("returns", "steps", "deliveries"), np.ones(1, int))
-            of_episodes(measure, counts_of_lone_ant(episode))  # raises an error if it cannot
-            return found
+    counts = [m for m in map(get, MEASURES.names()) if kind == "runs" and m.of == COUNTS]
+    for measure in counts:
+        for window in _windows(measure, measure.name.replace("_", " ")):
+            if window.name == name:
+                episode = dict.fromkeys(("returns", "steps", "deliveries"), np.ones(1, int))
+                of_episodes(measure, counts_of_lone_ant(episode))  # raises an error if it cannot
+                return window
     raise AntsError(f"measures is {shown(name)}; it must be one of {names_of(kind)}.")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -50,11 +50,6 @@ class Measure:
     episodes: int = 0
 
     @property
-    def part(self) -> str:
-        """The part of the value that the name selects; "" for the whole value."""
-        return self.name.partition(".")[2]
-
-    @property
     def label(self) -> str:
         """The text for axes and tables of finished runs."""
         words = self.summary or self.name.replace("_", " ")
@@ -64,11 +59,6 @@ class Measure:
     def uses_iqm(self) -> bool:
         """Whether tables of finished runs have an IQM; shares and counts have only a mean."""
         return self.of == RUN and self.unit in ("reward", "steps")
-
-    @property
-    def reads_series(self) -> bool:
-        """Whether it reads the series of another measure."""
-        return self.of not in (None, COUNTS, RUN)
 
     def check_single_state(self, where: str) -> None:
         """Raise AntsError if it does not read a single state, which the caller has."""
@@ -87,18 +77,13 @@ class Measure:
         """
         self.check_single_state("the measure")
         value = self.read(snapshot)
-        if isinstance(value, np.ndarray):
-            raise AntsError(
-                f"the measure {self.name!r} is an array of shape {value.shape}; choose one that "
-                "gives a number."
-            )
-        if isinstance(value, Mapping):
-            if len(value) != 1:
-                parts = ", ".join(f"{self.name}.{part}" for part in value)
-                raise AntsError(
-                    f"the measure {self.name!r} has {len(value)} parts; name one of {parts}."
-                )
+        if isinstance(value, Mapping) and len(value) == 1:
             (value,) = value.values()
+        if not isinstance(value, float):
+            raise AntsError(
+                f"the measure {self.name!r} is not a number, but {shown(value)}; name one of its "
+                "parts after a point, or another measure."
+            )
         return value
 
     def read(self, snapshot: Any, values: np.ndarray | None = None) -> Value:
@@ -111,15 +96,15 @@ class Measure:
         """
         arguments = {None: [snapshot], COUNTS: [snapshot.counts]}.get(self.of, [values, snapshot])
         value = self.computed(*arguments)
+        _, _, part = self.name.partition(".")
+        if part:
+            parts = value if isinstance(value, Mapping) else {}
+            if part not in parts:
+                known = ", ".join(map(str, parts)) or "no parts"
+                raise AntsError(f"{self.name!r} is not a part of the measure; it has {known}.")
+            value = parts[part]
         if isinstance(value, Mapping):
-            if not self.part:
-                return {str(part): self._number(number) for part, number in value.items()}
-            if self.part not in value:
-                parts = ", ".join(map(str, value))
-                raise AntsError(f"{self.name!r} is not a part of the measure; it has {parts}.")
-            value = value[self.part]
-        elif self.part:
-            raise AntsError(f"the measure of {self.name!r} has no parts; leave out the point.")
+            return {str(part): self._number(number) for part, number in value.items()}
         if isinstance(value, np.ndarray) and value.ndim:
             return value
         return self._number(value)
@@ -135,10 +120,6 @@ class Measure:
             raise AntsError(
                 f"the measure {self.name!r} failed with {reason}; correct its function."
             ) from error
-
-    def select(self, part: str) -> Measure:
-        """Return the measure of one part of the value."""
-        return replace(self, name=f"{self.name.partition('.')[0]}.{part}")
 
     def _number(self, value: object) -> float:
         if isinstance(value, np.ndarray) and value.ndim == 0:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from taichi_ants.errors import AntsError, expect, shown
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.measures.built_in import BUILT_IN
 from taichi_ants.measures.measure import COUNTS, RUN, Measure
 from taichi_ants.registry import Registry
@@ -48,8 +49,6 @@ def register(
             these arguments, or `of` is not a measure of one state.
     """
     MEASURES.check_new(name)
-    for what, text in (("unit", unit), ("summary", summary)):
-        expect(what, text, str)
     arguments = {None: ["snapshot"], COUNTS: [COUNTS], RUN: [RUN]}.get(of, ["values", "snapshot"])
     if of not in (None, COUNTS, RUN):
         get(of).check_single_state("of")
@@ -73,7 +72,7 @@ def get(name: str | Measure) -> Measure:
         return name
     whole, _, part = name.partition(".") if isinstance(name, str) else (name, "", "")
     measure = MEASURES.get(whole)
-    return measure.select(part) if part else measure
+    return replace(measure, name=name) if part else measure
 
 
 def check_part(name: str, world: World, task: Task, single: bool = False) -> None:
@@ -84,12 +83,9 @@ def check_part(name: str, world: World, task: Task, single: bool = False) -> Non
     whole, _, part = name.partition(".")
     if whole not in BUILT_IN:
         return
-    parts = BUILT_IN[whole].parts(world, task)
-    allowed = ", ".join(f"{whole}.{known}" for known in parts)
-    if part and part not in parts:
-        choose = f"choose one of {allowed}" if parts else "it has none, so leave out the point"
-        raise AntsError(f"{name!r} is not a part of {whole}; {choose}.")
-    if single and not part and len(parts) > 1:
-        raise AntsError(f"{name!r} has {len(parts)} parts; name one of {allowed}.")
-    if single and BUILT_IN[whole].is_array:
-        raise AntsError(f"{name!r} is an array; choose a measure that is a number.")
+    parts, is_array = BUILT_IN[whole].parts(world, task), BUILT_IN[whole].is_array
+    if part not in parts if part else single and (is_array or len(parts) > 1):
+        kind = f"a part of {whole}" if part else "one number"
+        allowed = ", ".join(f"{whole}.{known}" for known in parts)
+        choose = f"one of {allowed}" if allowed else "another measure"
+        raise AntsError(f"{name!r} is not {kind}; choose {choose}.")

@@ -5,23 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_whole, entries_of, shown
-from taichi_ants.measures.measure import RUN, Measure, Value
+from taichi_ants.errors import AntsError, checked_whole
+from taichi_ants.measures.measure import COUNTS, RUN, Measure, Value
 from taichi_ants.measures.registry import get
-from taichi_ants.records import Record, Snapshot
-
-
-class Colony(Protocol):
-    """The part of a colony that the recorder reads."""
-
-    @property
-    def episode_ticks(self) -> np.ndarray: ...
-
-    def snapshot(self, world: int) -> Snapshot: ...
+from taichi_ants.records import Record
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,29 +50,21 @@ class Recorder:
         every: Ticks between two rows; None for one row at the end of each episode.
 
     Raises:
-        AntsError: A measure does not exist or is listed twice, or `every` is not at least 1.
+        AntsError: A measure does not exist, or `every` is not at least 1.
     """
 
     def __init__(self, measures: Any = (), every: int | None = None) -> None:
-        listed = [measures] if isinstance(measures, (str, Measure)) else entries_of(measures)
-        if listed is None:
-            raise AntsError(f"measures is {shown(measures)}; give a list of names of measures.")
-        self.measures = [get(name) for name in listed]
-        names = [measure.name for measure in self.measures]
+        listed = [measures] if isinstance(measures, (str, Measure)) else measures
+        self.measures = list({measure.name: measure for measure in map(get, listed)}.values())
         for measure in self.measures:
-            if names.count(measure.name) > 1:
-                raise AntsError(f"measures has {measure.name!r} more than once; list it once.")
             if measure.of == RUN:
                 measure.check_single_state("measures")
         self.every = None if every is None else checked_whole("every", every)
         if self.every is not None and not self.measures:
             raise AntsError(f"every is {every}, but measures is empty; name at least one measure.")
         # Measures whose values the series of others need.
-        self._sources = {
-            str(measure.of): get(str(measure.of))
-            for measure in self.measures
-            if measure.reads_series
-        }
+        of = [measure.of for measure in self.measures]
+        self._sources = {name: get(name) for name in of if name not in (None, COUNTS)}
         self._rows: list[tuple[int, int, int]] = []  # world, episode, tick
         self._values: list[dict[str, Value]] = []  # of each row
         self._units: dict[str, str] = {}
@@ -93,12 +76,8 @@ class Recorder:
         self._read: dict[int, int] = {}  # the tick of the last row of each world
         self._earlier: dict[tuple[int, str], list[float]] = {}
 
-    def stops(self, ticks: int) -> Iterator[int]:
-        """Yield the ticks at which to call `read` in an episode of this length."""
-        return stops(ticks, self.every)
-
-    def read(self, colony: Colony) -> None:
-        """Read all measures, except in worlds that have not changed since their last row."""
+    def read(self, colony: Any) -> None:
+        """Read measures of a `Colony`, except in worlds that did not change since the last row."""
         for world, tick in enumerate(colony.episode_ticks.tolist() if self.measures else ()):
             if self._read.get(world) == tick:  # its episode has ended
                 continue

@@ -1,4 +1,4 @@
-"""Results as tidy rows, one value a row, for pandas, Parquet and CSV."""
+"""Results as tidy rows, one value a row, for pandas and CSV."""
 
 from __future__ import annotations
 
@@ -74,17 +74,6 @@ class Tidy:
     def to_csv(self, path: files.PathLike) -> None:
         """Write the tidy rows to a file of comma-separated values, with an empty field for nan."""
         files.write_csv(path, self.rows(), [*self.measured().index, "measure", "value"])
-
-    def to_parquet(self, path: files.PathLike) -> None:
-        """Write the tidy rows to a Parquet file; AntsError if pyarrow is not installed."""
-        arrow = imported("Parquet", "pyarrow", "parquet")
-        parquet = imported("Parquet", "pyarrow.parquet", "parquet")
-        columns: dict[str, Any] = self.columns()
-        columns["measure"] = arrow.array(columns["measure"].tolist()).dictionary_encode()
-        if columns["seed"].dtype == object:  # beyond 63 bits
-            columns["seed"] = arrow.array([str(seed) for seed in columns["seed"]])
-        table = arrow.table(columns)
-        files.write_atomically(path, lambda file: parquet.write_table(table, file))
 
 
 def seed_array(seeds: Any) -> np.ndarray:

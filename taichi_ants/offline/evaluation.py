@@ -125,7 +125,7 @@ def model_based(
     """
     policies, shape = _policies(data, q_values, epsilon)
     times = _times(data, resamples)
-    model, first = EmpiricalModel.resampled(data, times), data.state[data.begins[:-1]]
+    model, first = EmpiricalModel.of(data, times), data.state[data.begins[:-1]]
     starts = times / times.sum(axis=1, keepdims=True, dtype=np.int64)  # shares of episodes
 
     def estimated(policy: np.ndarray) -> tuple[np.ndarray, float]:

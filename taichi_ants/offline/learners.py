@@ -46,7 +46,9 @@ def batch_q_learning(
     Raises:
         AntsError: An argument is not allowed.
     """
-    groups, rates = _groups(data, by_run), (learning_rate, discount)
+    expect("data", data, Dataset)
+    runs = np.arange(len(data.seeds) + 1) if by_run else [0, len(data.seeds)]
+    groups, rates = np.searchsorted(data.run, runs).astype(np.int32), (learning_rate, discount)
     q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), initial_q, np.float32)
     runtime.start(threads)
     from taichi_ants.offline.kernels import replay  # imports Taichi
@@ -73,7 +75,7 @@ def fitted_q_iteration(
     state and action. The order of the data does not matter. Pairs without data keep `initial_q`.
     Arguments and errors are those of `batch_q_learning`; the discount must be at most 0.9999.
     """
-    model = EmpiricalModel.of(data, by_run)
+    model = _model(data, by_run)
     q = model.solve(discount, model.rewards, initial_q, threads=threads)
     return (q if by_run else q[0]).astype(np.float32)
 
@@ -97,7 +99,7 @@ def pessimistic_q_iteration(
         penalty: From 0 to 1e9, in units of reward. Other arguments and errors are those of
             `fitted_q_iteration`.
     """
-    model = EmpiricalModel.of(data, by_run)
+    model = _model(data, by_run)
     worst = data.task.rewards.by_event()[Event.ENTERED_EMPTY :].min()
     lowest = worst / (1.0 - discount)
     rewards = model.rewards - penalty / np.sqrt(model.counts)
@@ -132,56 +134,35 @@ class EmpiricalModel:
     probabilities: np.ndarray
 
     @classmethod
-    def of(cls, data: Dataset, by_run: bool) -> EmpiricalModel:
-        """Return the model of the data, with one group per run or a single group."""
-        groups = _groups(data, by_run)
-        group = np.repeat(np.arange(len(groups) - 1), np.diff(groups))
-        pair = (group * data.task.n_states + data.state) * N_ACTIONS + data.action
-        return cls._counted(data, len(groups) - 1, *_tally(data, pair)[:4])
-
-    @classmethod
-    def resampled(cls, data: Dataset, times: np.ndarray) -> EmpiricalModel:
-        """Return the model of resamples, a group each.
-
-        `times` (resamples, episodes) is how often each resample has each episode.
-        """
-        n_states = data.task.n_states
-        pair = data.state.astype(np.int64) * N_ACTIONS + data.action
-        pairs, successors, _, _, triple = _tally(data, pair)
-        models = []
-        for number, of_episode in enumerate(times):
-            rows = of_episode[data.episode].astype(np.float64)  # sums of integers stay exact
-            counts = np.bincount(triple, rows, len(pairs))
-            rewards, there = np.bincount(triple, rows * data.reward, len(pairs)), counts > 0
-            moved = pairs + number * n_states * N_ACTIONS
-            models.append([array[there] for array in (moved, successors, counts, rewards)])
-        return cls._counted(data, len(times), *map(np.concatenate, zip(*models, strict=True)))
-
-    @classmethod
-    def _counted(
-        cls,
-        data: Dataset,
-        n_groups: int,
-        pair: np.ndarray,
-        successor: np.ndarray,
-        counts: np.ndarray,
-        rewards: np.ndarray,
-    ) -> EmpiricalModel:
-        """Make a model from tallies by pair, with an offset of g tables in group g, and state."""
+    def of(cls, data: Dataset, times: np.ndarray) -> EmpiricalModel:
+        """Return the model of groups of episodes: `times` (groups, episodes) counts them."""
         n_states, size = data.task.n_states, data.task.n_states * N_ACTIONS
+        pair = data.state.astype(np.int64) * N_ACTIONS + data.action
+        # A pair of state and action, and its next state; n_states means that the step terminated.
+        key = pair * (n_states + 1) + np.where(data.terminated, n_states, data.next_state)
+        keys, number = np.unique(key, return_inverse=True)
+        groups = []
+        for group, of_episode in enumerate(times):
+            rows = of_episode[data.episode].astype(np.float64)  # sums of integers stay exact
+            counts = np.bincount(number, rows, len(keys))
+            sums, there = np.bincount(number, rows * data.reward, len(keys)), counts > 0
+            pairs = keys // (n_states + 1) + group * size
+            arrays = pairs, keys % (n_states + 1), counts, sums
+            groups.append([array[there] for array in arrays])
+        pair, successors, counts, sums = map(np.concatenate, zip(*groups, strict=True))
         pairs, first = np.unique(pair, return_index=True)
         total = np.add.reduceat(counts, first)
-        goes_on = successor < n_states
+        goes_on = successors < n_states
         share = counts / np.repeat(total, np.diff(first, append=len(pair)))
         return cls(
             n_states=n_states,
             largest=float(np.abs(data.task.rewards.by_event()).max()),
-            groups=np.searchsorted(pairs // size, np.arange(n_groups + 1)).astype(np.int32),
+            groups=np.searchsorted(pairs // size, np.arange(len(times) + 1)).astype(np.int32),
             pairs=(pairs % size).astype(np.int32),
             counts=total.astype(np.int64),
-            rewards=np.add.reduceat(rewards, first) / total,
+            rewards=np.add.reduceat(sums, first) / total,
             begins=np.append(0, np.cumsum(np.add.reduceat(goes_on, first))).astype(np.int32),
-            successors=successor[goes_on].astype(np.int32),
+            successors=successors[goes_on].astype(np.int32),
             probabilities=share[goes_on],
         )
 
@@ -217,19 +198,6 @@ class EmpiricalModel:
         return q
 
 
-def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Count the next states of each pair in ascending order; n_states means termination.
-
-    Returns:
-        Pairs, next states, counts, sums of rewards, and the index of these for each row.
-    """
-    ends = data.task.n_states
-    key = pair * (ends + 1) + np.where(data.terminated, ends, data.next_state)
-    keys, group = np.unique(key, return_inverse=True)
-    counts, rewards = np.bincount(group), np.bincount(group, data.reward)
-    return keys // (ends + 1), keys % (ends + 1), counts, rewards, group
-
-
 def tolerance(largest: float, discount: float, initial_q: float) -> float:
     """Return the tolerance of Q iteration, far above rounding errors.
 
@@ -238,9 +206,9 @@ def tolerance(largest: float, discount: float, initial_q: float) -> float:
     return 1e-12 * max(1.0, largest / (1.0 - discount), abs(initial_q))
 
 
-def _groups(data: Dataset, by_run: bool) -> np.ndarray:
-    """Return the first row of each run, or of all runs without `by_run`, and the end."""
+def _model(data: Dataset, by_run: bool) -> EmpiricalModel:
+    """Return the model of the data, with one group per run or a single group."""
     expect("data", data, Dataset)
-    n = len(data.seeds)
-    runs = np.arange(n + 1) if by_run else np.array([0, n])
-    return np.searchsorted(data.run, runs).astype(np.int32)
+    runs = data.run[data.begins[:-1]]
+    own = np.arange(len(data.seeds))[:, None] == runs
+    return EmpiricalModel.of(data, own if by_run else np.ones((1, len(runs)), bool))

@@ -27,6 +27,7 @@ SUPPORTS = COLONY - CHOICE - CASTES - FOODS - {"nests", "reward"}
 SUPPORTS |= {"choice.rule=softmax", "choice.temperature"}
 _FROM_TRACE = {"step": "steps", "state": "states", "action": "actions", "reward": "rewards"}
 _FROM_TRACE |= {"next_state": "next_states", "terminated": "terminated", "episode": "episodes"}
+_FROM_TRACE |= {"run": "runs", "behaviour_probability": "chances"}
 
 
 def record(
@@ -59,11 +60,11 @@ def record(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    arguments.checked_world(world, learns=isinstance(behaviour, TrainingConfig))
-    task, numbers = arguments.checked_lone_task(task), arguments.checked_seeds(seeds)
+    learns = isinstance(behaviour, TrainingConfig)
+    task, max_steps = arguments.checked_run(world, task, max_steps, learns)
+    numbers = arguments.checked_seeds(seeds)
     episodes = checked_whole("episodes", episodes)
     epsilon = arguments.checked_share("epsilon", epsilon)
-    max_steps = arguments.checked_max_steps(max_steps, task)
     runtime.start(threads, arch)
     facts: dict[str, Any]
     if isinstance(behaviour, TrainingConfig):
@@ -85,18 +86,11 @@ def record(
         tables = np.broadcast_to(tables, (len(numbers), *tables.shape[-2:]))
         words = np.array(numbers, dtype=object)
         runs = Runs.following(tables, words, np.arange(episodes), epsilon)
-    pieces = []
-    for columns, chances, run in record_steps(world, task, max_steps, runs, episodes, progress):
-        piece = {name: columns[there] for name, there in _FROM_TRACE.items()}
-        constants = {"run": run, "behaviour_probability": chances, "agent": np.zeros_like(run)}
-        pieces.append(_typed({**piece, **constants}))
+    pieces = [
+        {**{n: steps[there] for n, there in _FROM_TRACE.items()}, "agent": 0 * steps["runs"]}
+        for steps in record_steps(world, task, max_steps, runs, episodes, progress)
+    ]
     return _dataset(pieces, world=world, task=task, seeds=numbers, behaviour=facts)
-
-
-def _typed(piece: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Convert columns to their types, except `truncated`, which follows from the others."""
-    columns = {name: dtype for name, dtype in COLUMNS.items() if name != "truncated"}
-    return {name: piece[name].astype(dtype) for name, dtype in columns.items()}
 
 
 def record_colony(
@@ -117,7 +111,6 @@ def record_colony(
     refuse_unsupported("record_colony", uses, SUPPORTS, "record another colony")
     episodes = checked_whole("episodes", episodes)
     ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
-    arguments.check_progress(progress)
     if len(dict.fromkeys(colony.worlds)) > 1:
         raise AntsError("the worlds of the colony differ; record a separate colony for each world.")
     facts = {"policy": "colony", "sharing": colony.sharing, "ants": colony.ants}
@@ -129,7 +122,7 @@ def record_colony(
         for tick in range(ticks):
             before, tables = tables, colony.q_values
             piece = _tick(colony, tables, before)
-            pieces.append(_typed({**piece, "episode": np.full(len(piece["run"]), episode)}))
+            pieces.append({**piece, "episode": np.full(len(piece["run"]), episode)})
             if progress is not None:
                 progress((episode + (tick + 1) / ticks) / episodes)
             if not len(piece["run"]) and tick + 1 < ticks:  # all ants are dead
@@ -169,7 +162,9 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
 def _dataset(pieces: list[dict[str, np.ndarray]], **known: Any) -> Dataset:
     """Return the data set of rows, and find the ends of episodes; each ant's rows are in order."""
     rows: dict[str, Any] = {
-        name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]
+        name: np.concatenate([piece[name] for piece in pieces]).astype(dtype)
+        for name, dtype in COLUMNS.items()
+        if name in pieces[0]
     }
     pieces.clear()
     key = rows["run"].astype(np.int64)

@@ -6,15 +6,14 @@ Tests compare each step of the engines with it, for equality to the bit. To stay
 package imports only constants, errors, and the types `Task`, `TrainingConfig` (with
 `update_weights`) and `World` from `taichi_ants`. It reads only the fields of a world.
 
-Read `ReferenceColony.tick` in `colony.py` first. `beginner` and `follower` make colonies of one ant
-that learns or follows a table.
+Read `ReferenceColony.tick` in `colony.py` first.
 """
 
 from __future__ import annotations
 
-from taichi_ants.reference.colony import ReferenceColony, beginner, follower
+from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.learners import LEARNERS
 from taichi_ants.reference.observations import OBSERVATIONS
 
-__all__ = ["LEARNERS", "OBSERVATIONS", "ReferenceColony", "beginner", "follower"]
+__all__ = ["LEARNERS", "OBSERVATIONS", "ReferenceColony"]
 __dir__ = __all__.copy  # completion lists only public names

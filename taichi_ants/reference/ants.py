@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.reference.geometry import (
     Cell,
@@ -112,7 +111,7 @@ class Transition:
 
 
 def starts(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tuple[Cell, int]]:
-    """Return the start cell and heading of n ants; AntsError if the world has too few free cells.
+    """Return the start cell and heading of n ants, for which the world has enough free cells.
 
     The ants listed by the world are first. The seed decides the headings of the others, and the
     order in which they take free cells: those nearest to their queen first if `where` is "nest",
@@ -125,13 +124,6 @@ def starts(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tup
     taken = {*queens, *listed_cells(world.foods), *listed_cells(world.obstacles)}
     taken |= {cell for cell, _ in listed}
     orders = [iter(start_order(world, queen, seed, where)) for queen in queens]
-    missing = n - len(listed)
-    n_free = len(set(existing_cells(world.ranges)) - taken)
-    if missing > n_free:
-        raise AntsError(
-            f"n is {n}; the world lists {len(listed)} ants and has {n_free} free cells; "
-            "choose fewer ants or a larger world."
-        )
     for number in range(len(listed), n):
         cell = next(cell for cell in orders[nest_of(world, number)] if cell not in taken)
         taken.add(cell)

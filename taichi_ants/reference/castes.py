@@ -7,17 +7,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_INDIVIDUAL, STREAM_TRAIT
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, neighbour
-from taichi_ants.reference.numbers import exponential, logarithm, power
 from taichi_ants.reference.random_stream import RandomStream, stream_state
+from taichi_ants.rules.functions import exp, log, power
+from taichi_ants.task import Caste
 
 if TYPE_CHECKING:
-    from taichi_ants.task import Caste, Labour, Task, Threshold
+    from taichi_ants.task import Labour, Task, Threshold
 
 _WORDS = 4294967296.0
+
+
+def caste_of(task: Task, ant: Ant) -> Caste:
+    """Return the caste of an ant, one without settings if there are no castes."""
+    return [*task.castes.values()][ant.caste] if task.castes else Caste()
 
 
 def shares_of(castes: Sequence[Caste], nest: int) -> list[float | None]:
@@ -28,15 +33,13 @@ def shares_of(castes: Sequence[Caste], nest: int) -> list[float | None]:
     of_nest = [caste for caste in castes if caste.nest is None or caste.nest == nest]
     taken = sum([caste.share for caste in of_nest if caste.share is not None])
     neither = [caste for caste in of_nest if caste.share is None and caste.ants is None]
-    shares: list[float | None] = []
-    for caste in castes:
-        if not any(caste is other for other in of_nest) or caste.ants is not None:
-            shares.append(None)
-        elif caste.share is not None:
-            shares.append(caste.share)
-        else:
-            shares.append(max(1.0 - taken, 0.0) / len(neither))
-    return shares
+    rest = max(1.0 - taken, 0.0) / max(len(neither), 1)
+    return [
+        None
+        if caste.nest not in (None, nest) or caste.ants is not None
+        else (rest if caste.share is None else caste.share)
+        for caste in castes
+    ]
 
 
 def fixed_numbers(castes: Sequence[Caste], nest: int) -> list[int]:
@@ -51,9 +54,9 @@ def castes_at_start(castes: Sequence[Caste], nest: int, n: int) -> list[int]:
     """Return the castes of the n ants of a nest, in the order of their numbers."""
     numbers, shares = fixed_numbers(castes, nest), shares_of(castes, nest)
     rest = n - sum(numbers)
-    if rest < 0 or (rest and not any(shares)):
-        raise AntsError(f"the castes do not fit the {n} ants of nest {nest}; change them.")
-    quotas = [round(share * rest, 9) if share is not None else 0.0 for share in shares]
+    assert rest >= 0  # the castes fit
+    assert not rest or any(shares)
+    quotas = [round((share or 0.0) * rest, 9) for share in shares]
     numbers = [fixed + int(quota) for fixed, quota in zip(numbers, quotas, strict=True)]
     while sum(numbers) < n:
         remainders = [quota - int(quota) for quota in quotas]
@@ -72,8 +75,7 @@ def draw_caste(castes: Sequence[Caste], nest: int, n: int, stream: RandomStream)
     rest = (n - sum(fixed)) / n if n else 1.0
     cumulative = 0.0
     for caste in range(len(castes) - 1):
-        share = shares[caste]
-        cumulative += fixed[caste] / max(n, 1) + (0.0 if share is None else share * rest)
+        cumulative += fixed[caste] / max(n, 1) + (shares[caste] or 0.0) * rest
         if cumulative > high / _WORDS:
             return caste
     return len(castes) - 1
@@ -97,9 +99,9 @@ def draw_threshold(threshold: Threshold, seed: int, number: int) -> np.float32:
         q = a * a + b * b
         if q >= 1.0:
             continue
-        z = a * power(-2.0 * logarithm(q) / q, 0.5)
+        z = a * power(-2.0 * log(q) / q, 0.5)
         if threshold.distribution == "lognormal":
-            return np.float32(value * exponential(spread * z))
+            return np.float32(value * exp(spread * z))
         if value + spread * z >= 0.0:
             return np.float32(value + spread * z)
 
@@ -111,7 +113,7 @@ def draw_trait(seed: int, number: int) -> float:
 
 
 def epsilon_of(caste: Caste, ant: Ant, default: float) -> float:
-    """Return the exploration rate of an ant, whose caste can have another one than `usual`."""
+    """Return the exploration rate of an ant, whose caste can have another one than `default`."""
     if caste.epsilon is None:
         return default
     if not caste.epsilon_spread:
@@ -132,7 +134,7 @@ def starts_foraging(ant: Ant, stimulus: float, labour: Labour) -> bool:
 
 def stops_foraging(ant: Ant, queen: Cell, task: Task) -> bool:
     """Return whether a forager becomes idle, by a draw if it can."""
-    caste, chance = list(task.castes.values())[ant.caste], task.labour.stop_probability
+    caste, chance = caste_of(task, ant), task.labour.stop_probability
     at_nest = queen in [neighbour(ant.cell, heading) for heading in range(N_HEADINGS)]
     if not chance or caste.threshold.distribution == "none" or ant.carries or not at_nest:
         return False
@@ -142,8 +144,5 @@ def stops_foraging(ant: Ant, queen: Cell, task: Task) -> bool:
 
 def lays(task: Task, ant: Ant, name: str) -> bool:
     """Return whether an ant lays a pheromone."""
-    if not task.castes:
-        return True
-    caste = list(task.castes.values())[ant.caste]
-    names = [name.strip() for name in caste.lays.split(",")]
+    names = [name.strip() for name in caste_of(task, ant).lays.split(",")]
     return names == ["all"] or name in names

@@ -14,10 +14,10 @@ import numpy as np
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import neighbour
-from taichi_ants.reference.numbers import exponential, power
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
+from taichi_ants.rules.functions import exp, power
 from taichi_ants.task.constants import (
     FORWARD,
     GIVE,
@@ -50,9 +50,7 @@ def choose_action(
     best_value = max(values)
     if choice is not None and choice.rule == "softmax":
         assert choice.temperature is not None
-        weights = [
-            exponential((float(value) - float(best_value)) / choice.temperature) for value in values
-        ]
+        weights = [exp((float(value) - float(best_value)) / choice.temperature) for value in values]
         return weighted(weights, low)
     best = [action for action in range(N_ACTIONS) if values[action] == best_value]
     return best[pick(low, len(best))]
@@ -83,7 +81,7 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
     weights, nearer = [0.0, 0.0, 0.0], [False, False, False]
     cue = world.cue(ant)
     if world.has_compass(ant) and choice.carriers_follow is not None:
-        cue = world.pheromone_named(choice.carriers_follow)
+        cue = world.pheromones[choice.carriers_follow]
     for side in (LEFT, FORWARD, RIGHT):
         cell = neighbour(ant.cell, (ant.heading + side - 1) % N_HEADINGS)
         misread = side - 1 in ant.misread

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import copy
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import check_one_of
 from taichi_ants.features import COLONY, refuse_unsupported
 from taichi_ants.grid.constants import (
     N_HEADINGS,
     STREAM_ANT,
     STREAM_BORN,
     STREAM_QUEEN,
-    STREAM_ROLLOUT,
 )
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import frozen_policy
 from taichi_ants.reference.actions import Intent, carry_out, intend
 from taichi_ants.reference.ants import Ant, Transition, nest_of, starts
 from taichi_ants.reference.castes import (
+    caste_of,
     castes_at_start,
     draw_caste,
     draw_threshold,
@@ -41,20 +39,19 @@ from taichi_ants.reference.choice import (
 )
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
-from taichi_ants.reference.learners import LEARNERS, ReferenceLearner
+from taichi_ants.reference.learners import LEARNERS
 from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, codes_in_view, observe
 from taichi_ants.reference.own_observations import state_by
 from taichi_ants.reference.own_rules import choose_by_rule, pay
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
-from taichi_ants.reference.sharing import SHARING, ByGroup, FrozenTable
+from taichi_ants.reference.sharing import learn_together
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task import Caste, Choice, Food, Task
+from taichi_ants.task import Caste, Task
 from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 SUPPORTS = COLONY
-NO_CASTE = Caste()  # that of all ants if there are no castes
 
 
 @dataclass
@@ -78,31 +75,26 @@ class EpisodeRecord:
 class ReferenceColony:
     """A colony in one world. An episode is `begin_episode`, calls of `tick`, and `end_episode`.
 
-    The arguments are those of `Colony`. If ants have independent tables, a newborn ant starts with
-    the initial value, not with `q_values`.
+    The arguments are those of `Colony`, which checks them. If ants have independent tables, a
+    newborn ant starts with the initial value, not with `q_values`.
 
     Attributes:
         world: The present state of the world; each episode starts from `start_world`.
         n_ants: The number of ants at the start of an episode.
         starting: The number of these ants by nest.
-        pheromone: The task's pheromone, without evaporation where the task switches it off.
-        fields: The task's further pheromones by name, likewise.
         ants: The living ants by slot, 0 to `slots` - 1.
         streams: The random streams of the initial ants, which continue through all episodes.
         next_number: The number of the next ant that is added.
         stores: Food items that each queen will turn into ants.
         queen_stream: The queen's random stream, which continues; wandering food also uses it.
-        learners: The tables; see `sharing`.
+        learners: The tables: one for each slot if they are independent, else for each nest and
+            caste; see `table_of`.
         epsilon, learning_rate: Values in the present episode, float64.
         episode: The number of the episode in the run, from 0; -1 before the first.
         record: The sums of the present or latest episode.
         records: The sums of the finished episodes.
         transitions: The transition of each ant that acted in the last tick, by slot.
         over: Whether the episode has ended at a delivery; no further tick is possible.
-
-    Raises:
-        AntsError: The learner, a hyperparameter, the sharing or the observation is unknown, the
-            learner cannot share a table, or the world has too few cells for the ants.
     """
 
     def __init__(
@@ -122,83 +114,61 @@ class ReferenceColony:
         refuse_unsupported("the reference", task.uses(), SUPPORTS)
         if training is None:  # ants choose without action values
             training = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
-        check_one_of("sharing", sharing, tuple(SHARING))
-        check_one_of("learner", training.learner, tuple(LEARNERS))
-        falls = (
-            task.evaporation_in_evaluation if sharing == "frozen" else task.evaporation_in_training
-        )
-        self.pheromone = task.pheromone if falls else task.pheromone.lasting
-        self.fields = {n: field if falls else field.lasting for n, field in task.fields.items()}
         if task.observation in OBSERVATIONS:
             self._row = OBSERVATIONS[task.observation]
             self._turns = TURNS.get(task.observation, AHEAD)
         else:
             self._row, self._turns = state_by(task.sees), task.sees.cells
-        self.start_world, self._training = world, training
+        self.start_world, self.training = world, training
         self.n_ants, self._ends_at_delivery = ants, ends_at_delivery
         self.slots = capacity or (2 * ants + 64 if task.life.births else ants)
         self.seed, self.sharing, self.start = seed, sharing, start
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
-        make = partial(LEARNERS[training.learner], training, task.n_states)
-        self.castes = list(task.castes.values())
-        groups = len(queens_of(world)) * max(1, len(self.castes))
-        if sharing == "independent" or (groups == 1 and not self.castes):
-            self.learners = SHARING[sharing](make, self.slots, q_values)
-        else:
-            tables = [q_values] * groups
-            if q_values is not None and q_values.ndim > 2:
-                tables = list(q_values.reshape(groups, *q_values.shape[-2:]))
-            of_groups = [self._learner(make, g, table) for g, table in enumerate(tables)]
-            self.learners = ByGroup(of_groups, self.castes)
+        self._make = partial(LEARNERS[training.learner], training, task.n_states)
+        castes = self.castes or [Caste()]
+        n = self.slots if sharing == "independent" else len(queens_of(world)) * len(castes)
+        tables = [q_values] * n
+        if q_values is not None and q_values.ndim > 2:
+            tables = list(q_values.reshape(n, *q_values.shape[-2:]))
+        for number in range(n if sharing != "independent" else 0):
+            if (policy := castes[number % len(castes)].policy) is not None:
+                tables[number] = frozen_policy(policy, task.observation)
+        self.learners = [self._make(table) for table in tables]
         self.epsilon, self.learning_rate = training.epsilon, training.learning_rate
         self.episode = -1
         self.records: list[EpisodeRecord] = []
         self._set_up()
 
     @property
+    def castes(self) -> list[Caste]:
+        """The castes of the task, if any."""
+        return list(self.task.castes.values())
+
+    @property
+    def learns(self) -> bool:
+        """Whether ants learn."""
+        return self.sharing != "frozen"
+
+    @property
     def stimuli(self) -> list[float]:
         """The stimulus of each nest, to which idle ants respond."""
         return self.world.stimuli
 
-    @property
-    def foods(self) -> list[Food]:
-        """The kinds of food of the task; none for the usual food."""
-        return list(self.task.foods.values())
+    def table_of(self, ant: Ant | Transition) -> int:
+        """Return the number of the table of an ant."""
+        if self.sharing == "independent":
+            return ant.slot
+        return ant.nest * max(1, len(self.castes)) + ant.caste
 
-    def _learner(
-        self, make: Callable[..., ReferenceLearner], group: int, table: Any
-    ) -> FrozenTable:
-        """Return the table of a group of ants, frozen if its caste follows a policy."""
-        policy = self.castes[group % len(self.castes)].policy if self.castes else None
-        if policy is None:
-            return SHARING[self.sharing](make, self.slots, table)
-        return FrozenTable(make, self.slots, frozen_policy(policy, self.task.observation))
-
-    def caste_of(self, ant: Ant) -> Caste:
-        """Return the caste of an ant, one without settings if there are no castes."""
-        return self.castes[ant.caste] if self.castes else NO_CASTE
-
-    def take_castes(self) -> None:
-        """Take the numbers of castes from the task."""
-        self.castes = list(self.task.castes.values())
-        self.learners.take(self.castes, self._training.discount)
-        self.world.cues = self._cues()
-
-    def _cues(self) -> list[tuple[str, str]]:
-        """Return the names of the cues by caste."""
-        task = self.task
-        return [
-            (caste.outbound_cue or task.outbound_cue, caste.homing_cue or task.homing_cue)
-            for caste in self.castes or [NO_CASTE]
-        ]
+    def _is_frozen(self, ant: Ant) -> bool:
+        """Return whether the table of an ant never changes."""
+        follows = self.sharing == "shared" and caste_of(self.task, ant).policy is not None
+        return not self.learns or follows
 
     def _set_up(self) -> None:
         """Reset everything that lasts for one episode."""
-        self.world = WorldState(
-            *(self.start_world, self.pheromone, self.fields),
-            *(self._cues(), self.foods, self.task.rules),
-        )
+        self.world = WorldState(self.start_world, self.task, self.learns)
         self.food_sources = FoodSources(self.start_world)
         self.stores = [0] * len(self.world.queens)
         self.next_number = self.n_ants
@@ -216,15 +186,13 @@ class ReferenceColony:
         for number, (cell, heading) in enumerate(begin):
             nest, stream = nests[number], self.streams[number]
             caste = left[nest].pop(0) if self.castes else 0
-            ant = Ant(cell, heading, slot=number, number=number, stream=stream, nest=nest)
-            ant.caste = caste
-            self.add(ant)
+            self.add(Ant(cell, heading, False, number, number, stream, nest=nest, caste=caste))
         for ant in self.ants.values():
             self.observe(ant)
 
     def add(self, ant: Ant) -> None:
         """Put an ant into its slot and onto its cell, idle if it has a threshold."""
-        threshold = self.caste_of(ant).threshold
+        threshold = caste_of(self.task, ant).threshold
         ant.threshold = draw_threshold(threshold, self.seed, ant.number)
         ant.trait = draw_trait(self.seed, ant.number)
         ant.idle = threshold.distribution != "none"
@@ -234,7 +202,7 @@ class ReferenceColony:
     @property
     def q_values(self) -> np.ndarray:
         """A copy of the table, float32 (n_states, 5), or of all tables, (slots, n_states, 5)."""
-        tables = np.array([learner.table() for learner in self.learners.tables])
+        tables = np.array([learner.table() for learner in self.learners])
         if self.sharing == "independent":
             return tables
         axes = [n for n in (len(self.world.queens), len(self.castes)) if n > 1]
@@ -253,17 +221,16 @@ class ReferenceColony:
         self.start_world = world or self.start_world
         self.episode += 1
         self._set_up()
-        for learner in self.learners.tables:
+        for learner in self.learners:
             learner.begin()
 
     def end_episode(self) -> None:
         """End the episode: epsilon and the learning rate decay."""
-        training = self._training
+        training = self.training
         least = min(training.min_epsilon, training.epsilon)  # the bound never raises epsilon
         self.epsilon = max(least, self.epsilon * training.epsilon_decay)
         least = min(training.min_learning_rate, training.learning_rate)
         self.learning_rate = max(least, self.learning_rate * training.learning_rate_decay)
-        self.learners.set_learning_rate(self.learning_rate)
         self.records.append(self.record)
 
     def run_episode(self, ticks: int) -> Iterator[list[Transition]]:
@@ -274,15 +241,10 @@ class ReferenceColony:
             yield self.transitions
         self.end_episode()
 
-    def run(self, episodes: int, ticks: int) -> list[Transition]:
-        """Return all transitions of some episodes; see `run_episode`."""
-        ticked = (steps for _ in range(episodes) for steps in self.run_episode(ticks))
-        return [step for steps in ticked for step in steps]
-
     def tick(self, last: bool = False) -> None:
         """Advance the colony by one tick, after which the episode ends if `last`."""
-        if self.episode < 0 or self.over:
-            raise AssertionError("no episode is running; call begin_episode first")
+        assert self.episode >= 0
+        assert not self.over
         tick = self.record.ticks
         acting = [self.ants[slot] for slot in sorted(self.ants)]
         before = [copy.copy(ant) for ant in acting]
@@ -305,7 +267,7 @@ class ReferenceColony:
             picked = intent.target if intent.ant.event is Event.PICKED_UP else None
             if picked is not None and self.world.ground[picked] == EMPTY:  # its last load
                 self.food_sources.taken(picked, tick)
-        for trail in (self.world.trail, *self.world.fields.values()):
+        for trail in self.world.pheromones.values():
             trail.tick(tick)
         self._count(acting)
         self.record.carried += sum(
@@ -324,7 +286,7 @@ class ReferenceColony:
                 self._births(nest)
         dying = self._deaths(acting)
         life = self.task.life
-        delays = [food.regrowth for food in self.foods] or [life.regrowth]
+        delays = [food.regrowth for food in self.task.foods.values()] or [life.regrowth]
         self.record.regrown += self.food_sources.regrow(self.world, delays, tick)
         if life.pile_move_interval is not None and (tick + 1) % life.pile_move_interval == 0:
             self.food_sources.move_piles(self.world, self.queen_stream)
@@ -346,7 +308,7 @@ class ReferenceColony:
             if ant.slot in stopping:
                 ant.idle, ant.chosen = True, None
                 if self.sharing == "independent":
-                    self.learners.of(ant).begin()
+                    self.learners[ant.slot].begin()
         if self.task.labour.rule == "thresholds":
             self.stimuli[:] = [
                 stimulus + (self.task.labour.demand or 0.0) for stimulus in self.stimuli
@@ -367,25 +329,17 @@ class ReferenceColony:
             ant.reward = paid
 
     def _draw_action(self, ant: Ant, tick: int) -> int:
-        choice = self._choice_of(ant)
-        if choice.own_rule is not None:
-            values = self.learners.of(ant).rows[ant.state] if choice.needs_table else []
-            epsilon = self._epsilon_of(ant)
-            return choose_by_rule(self.world, ant, self.task, values, epsilon, tick)
-        if choice.rule == "deneubourg":
-            return choose_cell(self.world, ant, choice, self.task.traffic)
-        values = self.learners.of(ant).rows[ant.state]
-        return choose_action(values, self._epsilon_of(ant), ant.stream, choice)
-
-    def _choice_of(self, ant: Ant) -> Choice:
-        """Return the rule of choice with the numbers of the ant's caste."""
-        caste = self.caste_of(ant)
+        caste, choice = caste_of(self.task, ant), self.task.choice
         numbers = {name: getattr(caste, name) for name in ("temperature", "k", "exponent")}
         numbers = {name: number for name, number in numbers.items() if number is not None}
-        return replace(self.task.choice, **numbers) if numbers else self.task.choice
-
-    def _epsilon_of(self, ant: Ant) -> float:
-        return epsilon_of(self.caste_of(ant), ant, self.epsilon)
+        choice = replace(choice, **numbers) if numbers else choice
+        if choice.rule == "deneubourg":
+            return choose_cell(self.world, ant, choice, self.task.traffic)
+        values = self.learners[self.table_of(ant)].rows[ant.state] if choice.needs_table else []
+        epsilon = epsilon_of(caste, ant, self.epsilon)
+        if choice.own_rule is not None:
+            return choose_by_rule(self.world, ant, self.task, values, epsilon, tick)
+        return choose_action(values, epsilon, ant.stream, choice)
 
     def _count(self, acting: Sequence[Ant]) -> None:
         """Record what happened in the tick."""
@@ -428,7 +382,8 @@ class ReferenceColony:
         stream = RandomStream(state)
         ant = Ant(cell, heading, slot=slot, number=number, stream=stream, nest=nest, caste=caste)
         self.add(ant)
-        self.learners.born(slot)
+        if self.sharing == "independent":
+            self.learners[slot] = self._make(None)  # the initial value, and no memory
         self.next_number += 1
 
     def _deaths(self, acting: Sequence[Ant]) -> list[Ant]:
@@ -436,7 +391,7 @@ class ReferenceColony:
 
         A dying ant leaves its food on its cell.
         """
-        spans = [self.caste_of(ant).lifespan or self.task.life.lifespan for ant in acting]
+        spans = [caste_of(self.task, ant).lifespan or self.task.life.lifespan for ant in acting]
         for ant, span in zip(acting, spans, strict=True):
             ant.age += span is not None
         dying = [a for a, span in zip(acting, spans, strict=True) if span and a.age >= span]
@@ -456,7 +411,8 @@ class ReferenceColony:
         for was, ant in zip(before, after, strict=True):
             terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
             # After a delivery that terminates, the ant chooses at the start of its next tick.
-            if self.learners.draws_ahead(ant) and not terminated:
+            draws_ahead = self.learners[self.table_of(ant)].draws_next_action
+            if draws_ahead and not self._is_frozen(ant) and not terminated:
                 ant.chosen = self._draw_action(ant, self.record.ticks + 1)
             self.transitions.append(
                 Transition(
@@ -480,37 +436,19 @@ class ReferenceColony:
                     caste=ant.caste,
                 )
             )
-        if self.sharing != "independent":
-            self.learners.learn(self.transitions, [ant.stream for ant in after], self.epsilon)
-            return
-        for step, ant in zip(self.transitions, after, strict=True):
-            learner, caste = self.learners.of(ant), self.caste_of(ant)
+        members: dict[int, list[int]] = defaultdict(list)
+        for index, ant in enumerate(after):
+            if not self._is_frozen(ant):
+                members[self.table_of(ant)].append(index)
+        for number, indices in members.items():
+            learner, caste = self.learners[number], caste_of(self.task, after[indices[0]])
             rate, discount = caste.learning_rate, caste.discount
             learner.learning_rate = np.float32(self.learning_rate if rate is None else rate)
-            learner.discount = np.float32(self._training.discount if discount is None else discount)
+            learner.discount = np.float32(self.training.discount if discount is None else discount)
             epsilon = self.epsilon if caste.epsilon is None else caste.epsilon
-            self.learners.learn([step], [ant.stream], epsilon)
-
-
-def beginner(
-    world: World, config: TrainingConfig, seed: int, task: Task | None = None
-) -> ReferenceColony:
-    """Return a colony of one ant before its training."""
-    return ReferenceColony(world, task, config, seed, ends_at_delivery=True, sharing="independent")
-
-
-def follower(
-    world: World,
-    q_values: np.ndarray,
-    seed: int = 0,
-    number: int = 0,
-    task: Task | None = None,
-    epsilon: float = 0.0,
-) -> ReferenceColony:
-    """Return a colony of one ant that follows a table (n_states, 5) in rollout `number`."""
-    training = TrainingConfig("q_learning", 1.0, 1.0, epsilon, 1.0)
-    colony = ReferenceColony(
-        world, task, training, seed, ends_at_delivery=True, sharing="frozen", q_values=q_values
-    )
-    colony.streams[0] = RandomStream(stream_state(seed, STREAM_ROLLOUT, number))
-    return colony
+            steps = [self.transitions[index] for index in indices]
+            streams = [after[index].stream for index in indices]
+            if self.sharing == "independent":
+                steps[0].td_error = learner.learn(steps[0], epsilon, streams[0])
+            else:
+                learn_together(learner, steps, streams, epsilon, self.slots)

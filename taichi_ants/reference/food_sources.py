@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
-from taichi_ants.reference.geometry import Cell, listed_cells, neighbour
+from taichi_ants.reference.geometry import Cell, kinds_of_food, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
@@ -23,6 +23,7 @@ class FoodSource:
     cell: Cell
     kind: int = 0
     waiting_since: int | None = None  # the tick in which its food was taken; None if it has food
+    pile: int = -1
 
 
 class FoodSources:
@@ -33,10 +34,14 @@ class FoodSources:
     """
 
     def __init__(self, world: World) -> None:
-        cells = listed_cells(world.foods)
-        kinds = dict(zip(cells, world.food_kinds.tolist() or [0] * len(cells), strict=True))
-        self.food_sources = [FoodSource(cell, kinds[cell]) for cell in sorted(cells)]
-        self._piles = _connected(self.food_sources)
+        kinds = kinds_of_food(world)
+        self.food_sources = [FoodSource(cell, kinds[cell]) for cell in sorted(kinds)]
+        missing = {source.cell: source for source in self.food_sources}
+        for number, first in enumerate(self.food_sources):
+            pile = [missing.pop(first.cell)] if first.cell in missing else []
+            for source in pile:  # the list grows during this loop
+                source.pile = number
+                pile += [missing.pop(cell) for cell in _around(source.cell) if cell in missing]
 
     def put(self, cell: Cell, kind: int = 0) -> None:
         """Note that an intervention put food of a kind on a cell.
@@ -47,15 +52,11 @@ class FoodSources:
         """
         sources = [source for source in self.food_sources if source.cell == cell]
         if not sources:
-            around = [neighbour(cell, heading) for heading in range(N_HEADINGS)]
-            beside = next((source for source in self.food_sources if source.cell in around), None)
-            sources = [FoodSource(cell, waiting_since=0)]
+            around, known = _around(cell), self.food_sources
+            new = max((source.pile for source in known), default=-1) + 1
+            pile = next((source.pile for source in known if source.cell in around), new)
+            sources = [FoodSource(cell, waiting_since=0, pile=pile)]
             self.food_sources += sources
-            for pile in self._piles:
-                if any(source is beside for source in pile):
-                    pile += sources
-            if beside is None:
-                self._piles.append(list(sources))
         if all(source.waiting_since is not None for source in sources):
             sources[0].waiting_since = None
         for source in sources:
@@ -65,8 +66,6 @@ class FoodSources:
     def end(self, cell: Cell) -> None:
         """Note that an intervention removed the food source of a cell."""
         self.food_sources = [source for source in self.food_sources if source.cell != cell]
-        piles = [[source for source in pile if source.cell != cell] for pile in self._piles]
-        self._piles = [pile for pile in piles if pile]
 
     def taken(self, cell: Cell, tick: int) -> None:
         """Note that food was taken from a cell; its food source waits from this tick on."""
@@ -75,7 +74,7 @@ class FoodSources:
                 source.waiting_since = tick
 
     def regrow(self, world: WorldState, delays: Sequence[int | None], tick: int) -> int:
-        """Let food grow back on empty cells of food sources that have waited long enough.
+        """Let food grow back where food sources have waited long enough, and their cell is empty.
 
         `delays` are ticks, by kind of food; None means that the kind does not grow back.
 
@@ -85,13 +84,11 @@ class FoodSources:
         regrown = 0
         for source in self.food_sources:
             since, delay = source.waiting_since, delays[source.kind]
-            if delay is None:
-                continue
-            if since is None or tick < since + delay or world.content(source.cell) != EMPTY:
-                continue
-            world.put_food(source.cell, source.kind, world.full(source.kind))
-            source.waiting_since = None
-            regrown += world.full(source.kind)
+            waits = since is not None and delay is not None and tick >= since + delay
+            if waits and world.content(source.cell) == EMPTY:
+                world.put_food(source.cell, source.kind, world.full(source.kind))
+                source.waiting_since = None
+                regrown += world.full(source.kind)
         return regrown
 
     def move_piles(self, world: WorldState, stream: RandomStream) -> None:
@@ -101,10 +98,11 @@ class FoodSources:
         food source without food moves too, unless a rock, the queen or the edge of the world is
         ahead.
         """
-        for pile in self._piles:
+        for pile in sorted({source.pile for source in self.food_sources}):
             high, _ = stream.draw()
             heading = pick(high, N_HEADINGS)
-            for source in _front_first(pile, heading):
+            members = [source for source in self.food_sources if source.pile == pile]
+            for source in _front_first(members, heading):
                 ahead = neighbour(source.cell, heading)
                 if source.waiting_since is not None:
                     if world.ground.get(ahead, OBSTACLE) not in (OBSTACLE, QUEEN):
@@ -115,19 +113,8 @@ class FoodSources:
                     source.cell = ahead
 
 
-def _connected(food_sources: list[FoodSource]) -> list[list[FoodSource]]:
-    """Return the piles, which are connected food sources, in the order of the first of each."""
-    missing = {source.cell: source for source in food_sources}
-    piles = []
-    for source in food_sources:
-        if source.cell not in missing:
-            continue
-        pile = [missing.pop(source.cell)]
-        for member in pile:  # the list grows during this loop
-            around = (neighbour(member.cell, heading) for heading in range(N_HEADINGS))
-            pile += [missing.pop(cell) for cell in around if cell in missing]
-        piles.append(sorted(pile, key=food_sources.index))
-    return piles
+def _around(cell: Cell) -> list[Cell]:
+    return [neighbour(cell, heading) for heading in range(N_HEADINGS)]
 
 
 def _front_first(pile: list[FoodSource], heading: int) -> list[FoodSource]:

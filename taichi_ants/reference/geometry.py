@@ -54,3 +54,9 @@ def listed_cells(rows: np.ndarray) -> list[Cell]:
 def queens_of(world: World) -> list[Cell]:
     """Return the cells of the queens of a world, by nest."""
     return [world.queen, *listed_cells(world.other_queens)]
+
+
+def kinds_of_food(world: World) -> dict[Cell, int]:
+    """Return the kind of the food in each cell with food at the start."""
+    cells = listed_cells(world.foods)
+    return dict(zip(cells, world.food_kinds.tolist() or [0] * len(cells), strict=True))

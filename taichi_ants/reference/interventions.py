@@ -2,89 +2,154 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+import taichi_ants.interventions as language
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_INTERVENTION
-from taichi_ants.reference.ants import start_order
+from taichi_ants.reference.ants import Ant, start_order
 from taichi_ants.reference.castes import draw_caste
 from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.geometry import (
     Cell,
     distance,
     existing_cells,
+    kinds_of_food,
     listed_cells,
     normal_form,
 )
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
-from taichi_ants.reference.world_state import Trail
-from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds.world import World
 
 REACH = 8  # the most cells by which an ant is moved aside
+_CONTENTS = {"rock": OBSTACLE, "food": FOOD}
 
 
 class Interventions:
-    """Changes of a colony during an episode; ants observe again after each change.
+    """Changes of a colony during an episode.
 
-    Ants still take the actions that they have already drawn. A cell on which something cannot be
-    placed stays as it is. `ants` is the number of ants at the start of later episodes.
+    A cell on which something cannot be placed stays as it is. `ants` is the number of ants at the
+    start of later episodes.
     """
 
     def __init__(self, colony: ReferenceColony) -> None:
-        self.colony, self.ants = colony, colony.n_ants
+        self.colony, self.ants, self._first = colony, colony.n_ants, colony.start_world
+        # The content of cells when later episodes start, with the nest or the kind of food.
+        self._later = {cell: (QUEEN, nest) for nest, cell in enumerate(colony.world.queens)}
+        self._later |= {cell: (FOOD, kind) for cell, kind in kinds_of_food(self._first).items()}
+        self._later |= dict.fromkeys(listed_cells(self._first.obstacles), (OBSTACLE, 0))
         self._set_stream()
-        self._epsilon: float | None = None  # as an intervention has set them
-        self._learning_rate: float | None = None
-        self._first = colony.start_world
-        self._pheromone = colony.task.pheromone
-        self._falls = colony.pheromone.evaporation == self._pheromone.evaporation
-        for name, field in colony.fields.items():
-            self._falls = self._falls and field == colony.task.fields[name]
-        world = colony.start_world
-        # The content of the cells that are not empty when later episodes start.
-        self._queens = list(colony.world.queens)  # when later episodes start
-        self._start: dict[Cell, int] = dict.fromkeys(self._queens, QUEEN)
-        self._kinds = dict(colony.world.kinds)  # of their food
-        self._start |= dict.fromkeys(listed_cells(world.foods), FOOD)
-        self._start |= dict.fromkeys(listed_cells(world.obstacles), OBSTACLE)
 
     def _set_stream(self) -> None:
         """Start the stream of random numbers of the present episode."""
         state = stream_state(self.colony.seed, STREAM_INTERVENTION, max(self.colony.episode, 0))
         self._stream = RandomStream(state)
 
-    def _observe(self) -> None:
-        for ant in self.colony.ants.values():
-            self.colony.observe(ant)
+    def apply(self, change: Any) -> None:
+        """Apply an intervention; if it changes cells or ants, all ants observe again.
 
-    def put(self, cells: Sequence[Cell], what: int, kind: int = 0) -> None:
-        """Make cells EMPTY, OBSTACLE or FOOD, now and later, except those of ants and queens.
-
-        Rock and food first move ants on these cells aside. Food has all loads of its kind.
+        Ants still take the actions that they have already drawn.
         """
-        self._put(cells, what, kind, self.colony.world.full(kind))
-        self._observe()
+        colony, world = self.colony, self.colony.world
+        match change:
+            case language.Episode():
+                self._begin_episode()
+            case language.SetEpsilon():
+                colony.epsilon = change.value
+                colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
+            case language.SetLearningRate():
+                colony.training = replace(
+                    colony.training, learning_rate_decay=1.0, min_learning_rate=0.0
+                )
+                colony.learning_rate = change.value
+            case language.SetTask():
+                colony.task = change.changed(colony.task)
+                world.take(colony.task, colony.learns)
+            case language.SetPolicy():
+                table = np.asarray(change.table_for(colony.task), np.float32)
+                for learner in colony.learners:
+                    learner.rows = [list(row) for row in table]
+            case _:
+                self._change_cells_or_ants(change)
+                for ant in colony.ants.values():
+                    colony.observe(ant)
+
+    def _change_cells_or_ants(self, change: Any) -> None:
+        world, cells = self.colony.world, self._cells(change)
+        match change:
+            case language.RemoveAnts():
+                ants = self._ants(change.nest)
+                if change.cells is None:
+                    draws = [self._stream.draw() for _ in ants]
+                    order = sorted(range(len(ants)), key=draws.__getitem__)
+                    self._remove([ants[k] for k in order[: self._amount(change)]])
+                else:
+                    self._remove([ant for ant in ants if ant.cell in cells])
+            case language.AddAnts(cells=None):
+                self._add_some(self._amount(change), change.heading, change.nest)
+            case language.AddAnts():
+                nests = range(len(world.queens)) if change.nest is None else [change.nest]
+                nearest = [
+                    min(nests, key=lambda nest: distance(cell, world.queens[nest]))
+                    for cell in cells
+                ]
+                self._add(cells, nearest, change.heading)
+            case language.SetAnts():
+                ants, self.ants = self._ants(), change.number
+                self._remove(ants[change.number :])
+                self._add_some(max(change.number - len(ants), 0))
+            case language.Place(what="queen"):
+                self._move_queen(cells[0], change.nest or 0)
+            case language.Place():
+                names = list(self.colony.task.foods)
+                kind = names.index(change.kind) if change.kind else 0
+                self._put(cells, _CONTENTS[change.what], kind, world.full(kind))
+            case language.Clear():
+                self._put(cells, EMPTY)
+            case language.Move():
+                self._move(*cells)
+            case language.SetTrail():
+                for cell in world.ground if change.cells is None else cells:
+                    if world.ground[cell] != OBSTACLE:
+                        world.pheromones[change.field].lay(cell, change.level)
+
+    def _cells(self, change: Any) -> list[Cell]:
+        """Return the cells of an intervention, without duplicates."""
+        cells = getattr(change, "cells", None) or ()
+        if isinstance(cells, str):
+            return listed_cells(self.colony.start_world.regions[cells])
+        return list(dict.fromkeys(normal_form(*cell) for cell in cells))
+
+    def _ants(self, nest: int | None = None) -> list[Ant]:
+        """Return the living ants, or those of a nest, in the order of numbers."""
+        ants = [ant for ant in self.colony.ants.values() if nest in (None, ant.nest)]
+        return sorted(ants, key=lambda ant: ant.number)
+
+    def _amount(self, change: Any) -> int:
+        """Return a number of ants; a share is rounded, halves up."""
+        if change.number is not None:
+            return change.number
+        return int(change.share * len(self._ants(change.nest)) + 0.5)
 
     def _put(self, cells: Sequence[Cell], what: int, kind: int = 0, loads: int = 1) -> None:
+        """Make cells EMPTY, OBSTACLE or FOOD, now and later, except those of ants and queens."""
         world = self.colony.world
         if what != EMPTY:
             self._move_aside(cells)
         for cell in cells:
             if cell in world.ants or cell in world.queens:
                 continue
-            world.ground[cell] = self._start[cell] = what
+            world.ground[cell], self._later[cell] = what, (what, kind)
             if what == FOOD:
-                self._kinds[cell] = kind
                 world.put_food(cell, kind, loads)
                 self.colony.food_sources.put(cell, kind)
             else:
                 self.colony.food_sources.end(cell)
-        self._new_trail()
+        world.take(self.colony.task, self.colony.learns)  # rocks have no trail
 
     def _move_aside(self, cells: Sequence[Cell]) -> None:
         """Move the ants on these cells to the nearest empty cells, within REACH."""
@@ -98,75 +163,31 @@ class Interventions:
                     ant = world.ants[there] = world.ants.pop(cell)
                     ant.cell = there
 
-    def move(self, cell: Cell, to: Cell) -> None:
+    def _move(self, cell: Cell, to: Cell) -> None:
         """Move rock, food or the queen to an empty cell, now and later; ants move aside."""
         world = self.colony.world
         what = world.ground[cell]
-        if what != EMPTY and world.ground[to] == EMPTY:
-            self._move_aside([to])
-            if to not in world.ants and what == QUEEN:
-                self._move_queen(to, world.queens.index(cell))
-            elif to not in world.ants:
-                self._put([cell], EMPTY)
-                self._put([to], what, world.kinds.get(cell, 0), world.loads.get(cell, 1))
-        self._observe()
-
-    def move_queen(self, cell: Cell, nest: int = 0) -> None:
-        """Move a queen to an empty cell, now and later; an ant there moves aside."""
-        self._move_queen(cell, nest)
-        self._observe()
+        if what == EMPTY or world.ground[to] != EMPTY:
+            return
+        self._move_aside([to])
+        if to not in world.ants and what == QUEEN:
+            self._move_queen(to, world.queens.index(cell))
+        elif to not in world.ants:
+            self._put([cell], EMPTY)
+            self._put([to], what, world.kinds.get(cell, 0), world.loads.get(cell, 1))
 
     def _move_queen(self, cell: Cell, nest: int) -> None:
+        """Move a queen to an empty cell, now and later; an ant there moves aside."""
         world = self.colony.world
         self._move_aside([cell])
         assert world.content(cell) == EMPTY
-        for ground in (world.ground, self._start):
-            ground[world.queens[nest]], ground[cell] = EMPTY, QUEEN
-        world.queens[nest] = self._queens[nest] = cell
+        old, world.queens[nest] = world.queens[nest], cell
+        world.ground[old], world.ground[cell] = EMPTY, QUEEN
+        self._later[old], self._later[cell] = (EMPTY, 0), (QUEEN, nest)
         self.colony.food_sources.end(cell)
 
-    def _new_trail(self) -> None:
-        """Make new trails with the same levels, for the present rocks and pheromones."""
-        world = self.colony.world
-        rocks = [cell for cell, held in world.ground.items() if held == OBSTACLE]
-        bare = World(self._first.ranges, world.queen, obstacles=rocks)
-        rules = self.colony.task.rules
-        world.trail = self._copy(world.trail, Trail(bare, world.pheromone, rules=rules))
-        for name, field in self.colony.fields.items():
-            world.fields[name] = self._copy(world.fields[name], Trail(bare, field, rules=rules))
-
-    def _copy(self, old: Trail, new: Trail) -> Trail:
-        """Return a new trail after setting it to the levels of an old one."""
-        for cell, held in self.colony.world.ground.items():
-            if held != OBSTACLE:
-                new.lay(cell, old.level(cell))
-        return new
-
-    def lay_trail(self, cells: Sequence[Cell], level: int, field: str = "trail") -> None:
-        """Set the levels of a pheromone in cells other than rocks."""
-        world = self.colony.world
-        for cell in cells:
-            if world.ground[cell] != OBSTACLE:
-                world.pheromone_named(field).lay(cell, level)
-        self._observe()
-
-    def add_ants(
-        self, cells: Sequence[Cell], heading: int | None = None, nest: int | None = None
-    ) -> None:
-        """Put ants on those of the cells that are empty; draw each heading if none is given.
-
-        Without a nest, each belongs to the nearest queen, the first of several.
-        """
-        queens = self.colony.world.queens
-        nests = [
-            min(range(len(queens)), key=lambda queen: distance(cell, queens[queen]))
-            if nest is None
-            else nest
-            for cell in cells
-        ]
-        self._add(cells, nests, heading)
-
     def _add(self, cells: Sequence[Cell], nests: Sequence[int], heading: int | None) -> None:
+        """Put ants on those of the cells that are empty; draw each heading if none is given."""
         colony = self.colony
         pairs = zip(cells, nests, strict=True)
         free = [(cell, nest) for cell, nest in pairs if colony.world.content(cell) == EMPTY]
@@ -179,9 +200,8 @@ class Interventions:
         for (cell, nest), towards, caste in zip(free, headings, castes, strict=True):
             slot = next(slot for slot in range(colony.slots) if slot not in colony.ants)
             colony.new_ant(cell, towards, slot, nest, caste)
-        self._observe()
 
-    def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> None:
+    def _add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> None:
         """Put n ants on free cells, in the order of `ants.starts`; without a nest, by turns."""
         colony, world = self.colony, self.colony.world
         by_turns = range(len(world.queens)) if nest is None else [nest]
@@ -196,101 +216,31 @@ class Interventions:
             cells.append(next(cell for cell in free if cell not in cells))
         self._add(cells, nests, heading)
 
-    def remove_some(self, n: int, nest: int | None = None) -> None:
-        """Remove n random ants, or of a nest: those whose draws are the smallest."""
-        draws = {}
-        for ant in sorted(self.colony.ants.values(), key=lambda ant: ant.number):
-            if nest in (None, ant.nest):
-                high, low = self._stream.draw()
-                draws[high, low] = ant.cell
-        self.remove_ants([draws[draw] for draw in sorted(draws)[:n]])
+    def _remove(self, ants: Iterable[Ant]) -> None:
+        """Remove ants with their food."""
+        for ant in ants:
+            del self.colony.ants[ant.slot], self.colony.world.ants[ant.cell]
 
-    def set_task(self, task: Task) -> None:
-        """Change numbers of the task."""
-        self.colony.task, self._pheromone = task, task.pheromone
-        self.colony.world.foods = self.colony.foods
-        self.colony.take_castes()
-        learns = self.colony.sharing != "frozen"
-        self._falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
-        self.set_pheromone()
-
-    def set_policy(self, q_values: np.ndarray) -> None:
-        """Let all ants follow a table."""
-        for learner in self.colony.learners.tables:
-            learner.rows = [list(row) for row in np.asarray(q_values, np.float32)]
-
-    def remove_ants(self, cells: Sequence[Cell], nest: int | None = None) -> None:
-        """Remove the ants on these cells, or those of a nest, with their food."""
-        by_cell = self.colony.world.ants
-        for cell in cells:
-            if cell in by_cell and nest in (None, by_cell[cell].nest):
-                del self.colony.ants[by_cell.pop(cell).slot]
-        self._observe()
-
-    def set_ants(self, n: int) -> None:
-        """Set the number of ants, now and at the start of later episodes.
-
-        New ants take free cells as in `ants.starts`; the highest numbers are removed first.
-        """
-        colony = self.colony
-        self.ants = n
-        by_number = sorted(colony.ants.values(), key=lambda ant: ant.number)
-        if n < len(by_number):
-            self.remove_ants([ant.cell for ant in by_number[n:]])
-        else:
-            self.add_some(n - len(by_number))
-
-    def set_evaporation(self, falls: bool) -> None:
-        """Switch evaporation on (that of the task, or 1 per tick if it has none) or off."""
-        self._falls = falls
-        if falls and self._pheromone.evaporation == "none":
-            self.set_pheromone(evaporation="linear")
-        self.set_pheromone()
-
-    def set_pheromone(self, **numbers: Any) -> None:
-        """Change numbers of the pheromone, but not whether it is dense."""
-        self._pheromone = replace(self._pheromone, **numbers)
-        still: dict[str, Any] = {} if self._falls else {"evaporation": "none", "half_life": None}
-        now = replace(self._pheromone, **still)
-        self.colony.pheromone = self.colony.world.pheromone = now
-        self.colony.fields = {
-            name: field if self._falls else field.lasting
-            for name, field in self.colony.task.fields.items()
-        }
-        self._new_trail()
-
-    def set_epsilon(self, epsilon: float) -> None:
-        """Set epsilon for this and all later episodes."""
-        self._epsilon = self.colony.epsilon = epsilon
-
-    def set_learning_rate(self, learning_rate: float) -> None:
-        """Set the learning rate for this and all later episodes."""
-        self._learning_rate = self.colony.learning_rate = learning_rate
-        self.colony.learners.set_learning_rate(learning_rate)
-
-    def begin_episode(self) -> None:
+    def _begin_episode(self) -> None:
         """End the episode, and start the next one in the world as interventions have changed it."""
-        colony, first = self.colony, self._first
+        colony, first, later = self.colony, self._first, self._later
         colony.end_episode()
-        if self._epsilon is not None:
-            colony.epsilon = self._epsilon
-        if self._learning_rate is not None:
-            self.set_learning_rate(self._learning_rate)
         colony.n_ants = self.ants
         for number in range(len(colony.streams), self.ants):
             state = stream_state(colony.seed, STREAM_ANT, number)
             colony.streams.append(RandomStream(state))
-        start = self._start
-        held = {kind: [cell for cell in start if start[cell] == kind]
-                for kind in (QUEEN, FOOD, OBSTACLE)}  # fmt: skip
+        held = {
+            content: [(cell, number) for cell, (what, number) in later.items() if what == content]
+            for content in (QUEEN, FOOD, OBSTACLE)
+        }
+        queens = [cell for cell, _ in sorted(held[QUEEN], key=lambda queen: queen[1])]
+        rocks = [cell for cell, _ in held[OBSTACLE]]
         trails = [(tuple(row[:3]), row[3]) for row in first.trails.tolist()]
-        trails = [(cell, level) for cell, level in trails if start.get(cell) != OBSTACLE]
+        trails = [(cell, level) for cell, level in trails if cell not in rocks]
         ants = [(tuple(row[:3]), row[3]) for row in first.ants.tolist()]
-        ants = [(cell, heading) for cell, heading in ants if start.get(cell, EMPTY) == EMPTY]
-        foods = [(cell, self._kinds[cell]) for cell in held[FOOD]]
-        now = World(
-            *(first.ranges, self._queens, foods, held[OBSTACLE], trails, ants),
-            regions=first.regions,
+        ants = [(cell, heading) for cell, heading in ants if later.get(cell, (EMPTY,))[0] == EMPTY]
+        world = World(
+            *(first.ranges, queens, held[FOOD], rocks, trails, ants), regions=first.regions
         )
-        colony.begin_episode(now)
+        colony.begin_episode(world)
         self._set_stream()

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
 from taichi_ants.reference.ants import Pair, Transition
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.task.constants import N_ACTIONS
@@ -42,11 +41,7 @@ class ReferenceLearner:
         self, config: TrainingConfig, n_states: int, q_values: np.ndarray | None = None
     ) -> None:
         """Start with a copy of a table (n_states, 5), or with `initial_q`, and without memories."""
-        self.name = config.learner
-        hyperparameters = dict(config.hyperparameters)
-        for name in hyperparameters.keys() - self.hyperparameters.keys():
-            raise AntsError(f"{name!r} is not a hyperparameter of {self.name!r}; leave it out.")
-        self.settings = {**self.hyperparameters, **hyperparameters}
+        self.settings = {**self.hyperparameters, **dict(config.hyperparameters)}
         self.learning_rate = np.float32(config.learning_rate)
         self.discount = np.float32(config.discount)
         if q_values is None:

@@ -7,6 +7,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Sequence
 
 from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.geometry import Cell, distance, listed_cells, neighbour
 from taichi_ants.task.constants import OBSTACLE
@@ -21,17 +22,14 @@ def first_delivery(colony: ReferenceColony) -> float:
     return record.ticks if record.first_delivery == -1 else record.first_delivery
 
 
-def efficiency(colony: ReferenceColony) -> float:
-    """Return the deliveries per living ant and tick."""
-    if not colony.ants or not colony.record.ticks:
-        return NONE
-    return colony.record.deliveries / (colony.record.ticks * len(colony.ants))
+def ratio(part: float, whole: float) -> float:
+    """Return a share; nan of nothing."""
+    return part / whole if whole else NONE
 
 
 def path_length(colony: ReferenceColony) -> float:
     """Return the mean ticks from pick-up to delivery."""
-    record = colony.record
-    return record.carried / record.deliveries if record.deliveries else NONE
+    return ratio(colony.record.carried, colony.record.deliveries)
 
 
 def path_ratio(colony: ReferenceColony) -> float:
@@ -62,49 +60,26 @@ def entropy(colony: ReferenceColony) -> float:
     if len(cells) < 2 or not levels:
         return NONE
     total = math.fsum(level * n for level, n in levels.items())
-    terms = []
-    for level, n in levels.items():
-        share = level / total
-        if share > 0:
-            terms.append(n * (share * math.log(share)))
+    shares = [(level / total, n) for level, n in levels.items()]
+    terms = [n * (share * math.log(share)) for share, n in shares if share > 0]
     return max(0.0, -math.fsum(terms) / math.log(len(cells)))
 
 
-def blocked_share(colony: ReferenceColony) -> float:
-    """Return the share of moves that failed; nan before the first move."""
-    return colony.record.blocked / colony.record.moves if colony.record.moves else NONE
+def mean_of_ants(
+    value: Callable[[ReferenceColony, Ant], float],
+) -> Callable[[ReferenceColony], float]:
+    """Return a function that returns the mean of a value of the living ants."""
+
+    def mean(colony: ReferenceColony) -> float:
+        values = [value(colony, ant) for ant in colony.ants.values()]
+        return sum(values) / len(values) if values else NONE
+
+    return mean
 
 
-def activity(colony: ReferenceColony) -> float:
-    """Return the share of the living ants that entered a cell in the last tick."""
-    entered = [a.event in (Event.ENTERED_EMPTY, Event.ENTERED_CUE) for a in colony.ants.values()]
-    return entered.count(True) / len(entered) if entered else NONE
-
-
-def carriers(colony: ReferenceColony) -> float:
-    """Return the share of the living ants with food."""
-    loads = [ant.carries for ant in colony.ants.values()]
-    return sum(loads) / len(loads) if loads else NONE
-
-
-def foraging(colony: ReferenceColony) -> float:
-    """Return the share of the living ants that are not idle."""
-    forage = [not ant.idle for ant in colony.ants.values()]
-    return sum(forage) / len(forage) if forage else NONE
-
-
-def mean_distance(colony: ReferenceColony) -> float:
-    """Return the mean distance of the ants to the nearest queen."""
-    queens = colony.world.queens
-    far = [min(distance(ant.cell, queen) for queen in queens) for ant in colony.ants.values()]
-    return sum(far) / len(far) if far else NONE
-
-
-def share_in_region(colony: ReferenceColony, name: str) -> float:
-    """Return the share of the ants in a region of the world."""
-    cells = set(listed_cells(colony.start_world.regions[name]))
-    inside = [ant.cell in cells for ant in colony.ants.values()]
-    return sum(inside) / len(inside) if inside else NONE
+def steps_to_queen(colony: ReferenceColony, ant: Ant) -> int:
+    """Return the distance of an ant to the nearest queen."""
+    return min(distance(ant.cell, queen) for queen in colony.world.queens)
 
 
 def deliveries_by(colony: ReferenceColony, part: str) -> int:
@@ -121,23 +96,28 @@ def measured(colony: ReferenceColony, name: str) -> float:
     before, _, part = name.partition(".")
     if before == "deliveries_by":
         return deliveries_by(colony, part)
-    return share_in_region(colony, part) if before == "regions" else MEASURES[name](colony)
+    if before == "regions":
+        cells = listed_cells(colony.start_world.regions[part])
+        return mean_of_ants(lambda _, ant: ant.cell in cells)(colony)
+    return MEASURES[name](colony)
 
 
 MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
     "deliveries": lambda colony: colony.record.deliveries,
     "first_delivery": first_delivery,
-    "efficiency": efficiency,
+    "efficiency": lambda colony: ratio(
+        colony.record.deliveries, colony.record.ticks * len(colony.ants)
+    ),
     "path_length": path_length,
     "path_ratio": path_ratio,
     "entropy.trail": entropy,
     "waiting_births": lambda colony: sum(colony.stores),
-    "blocked_share": blocked_share,
-    "activity": activity,
+    "blocked_share": lambda colony: ratio(colony.record.blocked, colony.record.moves),
+    "activity": mean_of_ants(lambda _, ant: ant.event in (Event.ENTERED_EMPTY, Event.ENTERED_CUE)),
     "living": lambda colony: len(colony.ants),
-    "carriers": carriers,
-    "foraging": foraging,
-    "distance": mean_distance,
+    "carriers": mean_of_ants(lambda _, ant: ant.carries),
+    "foraging": mean_of_ants(lambda _, ant: not ant.idle),
+    "distance": mean_of_ants(steps_to_queen),
 }
 
 

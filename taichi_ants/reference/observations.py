@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from functools import partial
 
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, distance, neighbour
-from taichi_ants.reference.world_state import Level, WorldState
+from taichi_ants.reference.world_state import Level, Trail, WorldState
 from taichi_ants.task.constants import (
     EMPTY,
     FOOD,
-    QUEEN,
     SEES_CUE,
     SEES_EMPTY,
     SEES_GOAL,
@@ -30,6 +29,16 @@ NOTHING, OBSTACLE, WEAK, MIDDLE, STRONG, GOAL = range(6)
 def cells_in_view(ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Cell]:
     """Return the cells at these headings relative to the ant's."""
     return [neighbour(ant.cell, ant.heading + turn) for turn in turns]
+
+
+def levels_in_view(
+    world: WorldState, ant: Ant, trail: Trail, turns: tuple[int, ...], hidden: Container[int]
+) -> list[Level]:
+    """Return the levels of cells on empty ground or under ants, 0 for others and `hidden` turns."""
+    return [
+        trail.level(cell) if world.ground.get(cell) == EMPTY and turn not in hidden else 0
+        for turn, cell in zip(turns, cells_in_view(ant, turns), strict=True)
+    ]
 
 
 def strongest_in_view(world: WorldState, ant: Ant) -> Level:
@@ -68,12 +77,11 @@ def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -
 
 
 def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
-    content = world.content(cell)
-    if content == QUEEN and cell != world.queens[ant.nest]:
-        return SEES_OBSTACLE
-    if content == (QUEEN if ant.carries else FOOD):
+    content, queen = world.content(cell), world.queens[ant.nest]
+    is_goal = cell == queen if ant.carries else content == FOOD
+    if is_goal:
         return SEES_GOAL
-    if content != EMPTY:  # also the queen for foragers, and food for carriers
+    if content != EMPTY:  # also queens, and food for carriers
         return SEES_OBSTACLE
     if world.has_compass(ant):
         shows_cue = is_better(world, ant, cell)

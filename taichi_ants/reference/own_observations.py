@@ -15,11 +15,11 @@ from taichi_ants.reference.observations import (
     OBSERVATIONS,
     cells_in_view,
     codes_seen,
+    levels_in_view,
     strongest_in_view,
 )
 from taichi_ants.reference.world_state import Trail, WorldState
 from taichi_ants.rules.inputs import Vector
-from taichi_ants.task.constants import EMPTY
 
 if TYPE_CHECKING:
     from taichi_ants.task import Observation
@@ -45,22 +45,23 @@ def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleName
     cue, queen = world.cue(ant), world.queens[ant.nest]
     # All levels of cues are float32 if those of one cue are.
     cues = {name for pair in world.cues for name in pair if name != "compass"}
-    dense = any(world.pheromone_named(name).rule.dense for name in cues)
-    kind: type = np.float32 if dense else np.int32
+    dense = any(world.pheromones[name].rule.dense for name in cues)
 
-    def levels(trail: Trail, kind: type) -> Vector:
-        return Vector(
-            kind(trail.level(cell) if shows and world.ground.get(cell) == EMPTY else 0)
-            for cell, shows in zip(cells, is_seen, strict=True)
-        )
+    def levels(trail: Trail, dense: bool) -> tuple[Vector, Any]:
+        """Return the levels of the cells, and that of the ant's cell."""
+        kind: type = np.float32 if dense else np.int32
+        in_view = levels_in_view(world, ant, trail, turns, ant.misread)
+        return Vector(map(kind, in_view)), kind(trail.level(ant.cell))
 
-    ahead, own_level = levels(cue, kind), kind(cue.level(ant.cell))
+    ahead, own_level = levels(cue, dense)
     if world.cues[ant.caste][1] == "compass":
         far = distance(ant.cell, queen)
         nearer = [distance(cell, queen) < far for cell in cells]
     else:
         nearer = [bool(level > own_level) for level in ahead]
-    others = [world.ants.get(cell) for cell in cells]
+    others = [
+        world.ants.get(cell) if seen else None for cell, seen in zip(cells, is_seen, strict=True)
+    ]
     codes = codes_seen(world, ant, turns)
     left, forward, right = (codes[turns.index(turn)] for turn in (-1, 0, 1))
     view: dict[str, Any] = {
@@ -69,22 +70,19 @@ def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleName
         "codes": Vector(codes),
         "levels": ahead,
         "ants": Vector(
-            1 + other.carries if shows and other is not None and other.nest == ant.nest else 0
-            for other, shows in zip(others, is_seen, strict=True)
+            1 + other.carries if other is not None and other.nest == ant.nest else 0
+            for other in others
         ),
         "other_nest_ants": Vector(
-            int(shows and other is not None and other.nest != ant.nest)
-            for other, shows in zip(others, is_seen, strict=True)
+            int(other is not None and other.nest != ant.nest) for other in others
         ),
         "nearer": Vector(
-            int(is_nearer and shows) for is_nearer, shows in zip(nearer, is_seen, strict=True)
+            int(is_nearer and seen) for is_nearer, seen in zip(nearer, is_seen, strict=True)
         ),
-        "strongest": kind(strongest_in_view(world, ant)),
+        "strongest": type(own_level)(strongest_in_view(world, ant)),
         "own_level": own_level,
     }
     for name in observation.reads:
-        trail = world.pheromone_named(name)
-        kind_read: type = np.float32 if trail.rule.dense else np.int32
-        view[name] = levels(trail, kind_read)
-        view[f"own_{name}"] = kind_read(trail.level(ant.cell))
+        trail = world.pheromones[name]
+        view[name], view[f"own_{name}"] = levels(trail, trail.rule.dense)
     return SimpleNamespace(**view)

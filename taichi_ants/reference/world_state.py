@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,24 +14,24 @@ from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import (
     Cell,
     existing_cells,
+    kinds_of_food,
     listed_cells,
     neighbour,
     queens_of,
 )
+from taichi_ants.task import Caste
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from taichi_ants.rules import Parameters, Rule
-    from taichi_ants.task import Field, Food, Pheromone
+    from taichi_ants.task import Pheromone, Task
     from taichi_ants.worlds.world import World
 
 Level = int | np.integer | np.float32
 
 
 class Trail:
-    """The level of a pheromone in each cell, by default that of the trail of the world.
+    """The level of a pheromone in each of the cells without rock.
 
     With linear or no evaporation, levels are integers. With exponential evaporation or diffusion,
     they are float32, and every operation rounds.
@@ -38,37 +39,33 @@ class Trail:
 
     def __init__(
         self,
-        world: World,
+        cells: Sequence[Cell],
         pheromone: Pheromone,
-        is_empty: bool = False,
-        rules: Mapping[str, Parameters] | None = None,
+        levels: Mapping[Cell, Level] = MappingProxyType({}),
+        rules: Mapping[str, Parameters] = MappingProxyType({}),
     ) -> None:
-        self.rule, self._rules = pheromone, rules or {}
-        rocks = set(listed_cells(world.obstacles))
-        self._cells = [cell for cell in existing_cells(world.ranges) if cell not in rocks]
-        self._place = {cell: index for index, cell in enumerate(self._cells)}
+        self.rule, self._rules = pheromone, rules
+        self._index = {cell: index for index, cell in enumerate(cells)}
         kind = np.float32 if pheromone.dense else np.int64
-        self._levels: np.ndarray = np.zeros(len(self._cells), kind)
-        for x, y, z, level in [] if is_empty else world.trails.tolist():
-            self._levels[self._place[x, y, z]] = level
+        self._levels: np.ndarray = np.array([levels.get(cell, 0) for cell in cells], kind)
         if pheromone.diffusion > 0:
             # Rocks and the outside are walls, which all have the index behind the last cell.
-            wall = len(self._cells)
+            wall = len(cells)
             around = [
-                [self._place.get(neighbour(cell, heading), wall) for heading in range(N_HEADINGS)]
-                for cell in self._cells
+                [self._index.get(neighbour(cell, heading), wall) for heading in range(N_HEADINGS)]
+                for cell in cells
             ]
             self._around = np.array(around)
             self._n_open = np.count_nonzero(self._around != wall, axis=1).astype(np.float32)
 
     def level(self, cell: Cell) -> Level:
         """Return the level of a cell, 0 for a rock."""
-        index = self._place.get(cell)
+        index = self._index.get(cell)
         return 0 if index is None else self._levels[index]
 
     def lay(self, cell: Cell, level: Level) -> None:
         """Set the level of a cell other than a rock."""
-        self._levels[self._place[cell]] = level
+        self._levels[self._index[cell]] = level
 
     def deposit(
         self, cell: Cell, ant: Ant, tick: int, others: Mapping[str, Trail], stimulus: float
@@ -78,21 +75,13 @@ class Trail:
         The ant has the load and the event after its action, and the paper's state before it.
         `others` are all pheromones by name, `stimulus` is that of the ant's nest.
         """
-        index, rule, carried = self._place[cell], self.rule, ant.carried
+        index, rule, carried = self._index[cell], self.rule, ant.carried
         if rule.own_deposit is not None:
-            facts: dict[str, Any] = {
-                "carried": carried,
-                "carries": ant.carries,
-                "event": ant.event,
-                "tick": tick,
-            }
-            facts |= {
-                "paper_state": ant.paper_state,
-                "trait": ant.trait,
-                "threshold": ant.threshold,
-            }
-            facts["stimulus"] = stimulus
-            facts |= {f"level_{name}": trail.level(cell) for name, trail in others.items()}
+            facts: dict[str, Any] = {name: trail.level(cell) for name, trail in others.items()}
+            facts = {f"level_{name}": level for name, level in facts.items()}
+            for name in ("carried", "carries", "event", "paper_state", "trait", "threshold"):
+                facts[name] = getattr(ant, name)
+            facts |= {"tick": tick, "stimulus": stimulus}
             level = self._computed(rule.own_deposit, index, facts)
             self._levels[index] = level if rule.dense else math.floor(level)
         elif rule.deposit == "set":
@@ -116,7 +105,7 @@ class Trail:
         if evaporation is not None:
             indices = range(len(self._levels))
             levels = [self._computed(evaporation, index, {"tick": tick}) for index in indices]
-            self._levels = np.array(levels).astype(np.float32)
+            self._levels = np.array(levels, np.float32)
         elif self.rule.evaporation == "linear":
             self._levels = np.maximum(self._levels - 1, 0)
         elif self.rule.evaporation == "exponential":
@@ -139,38 +128,54 @@ class Trail:
 class WorldState:
     """The state of a world in an episode.
 
-    `ground` maps each cell to EMPTY, OBSTACLE, FOOD or QUEEN; it is EMPTY under ants. `ants` maps
-    cells to ants. `fields` are further pheromones by name. `cues` are the names of the outbound and
-    the homing cue by caste. `stimuli` are those of the nests.
+    Attributes:
+        ground: The content of each cell: EMPTY, OBSTACLE, FOOD or QUEEN; EMPTY under ants.
+        kinds, loads: The kind of the food in a cell, and its loads.
+        ants: The ants by their cells.
+        pheromones: The trail and the further fields, by name.
+        cues: The names of the outbound and the homing cue, by caste.
+        foods: The kinds of food of the task; none for the usual food.
+        stimuli: Those of the nests, to which idle ants respond.
     """
 
-    def __init__(
-        self,
-        world: World,
-        pheromone: Pheromone,
-        fields: Mapping[str, Field] | None = None,
-        cues: Sequence[tuple[str, str]] = (("trail", "compass"),),
-        foods: Sequence[Food] = (),
-        rules: Mapping[str, Parameters] | None = None,
-    ) -> None:
-        self._ranges, self.foods = world.ranges, foods
+    def __init__(self, world: World, task: Task, learns: bool = False) -> None:
+        self._ranges = world.ranges
         self.queens: list[Cell] = queens_of(world)
         self.stimuli = [0.0] * len(self.queens)
-        self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(self._ranges), EMPTY)
-        self.ground.update(dict.fromkeys(self.queens, QUEEN))
-        self.ground.update(dict.fromkeys(listed_cells(world.foods), FOOD))
-        # The kind of the food in a cell, and its loads.
-        self.kinds = dict.fromkeys(listed_cells(world.foods), 0)
-        self.kinds.update(zip(self.kinds, world.food_kinds.tolist(), strict=False))
-        self.loads = {cell: self.full(kind) for cell, kind in self.kinds.items()}
-        self.ground.update(dict.fromkeys(listed_cells(world.obstacles), OBSTACLE))
         self.ants: dict[Cell, Ant] = {}
-        self.pheromone = pheromone
-        self.trail = Trail(world, pheromone, rules=rules)
-        self.fields = {
-            name: Trail(world, field, True, rules) for name, field in (fields or {}).items()
+        self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(world.ranges), EMPTY)
+        self.ground |= dict.fromkeys(self.queens, QUEEN)
+        self.ground |= dict.fromkeys(listed_cells(world.foods), FOOD)
+        self.ground |= dict.fromkeys(listed_cells(world.obstacles), OBSTACLE)
+        levels = {(x, y, z): level for x, y, z, level in world.trails.tolist()}
+        self.pheromones = {"trail": Trail([*self.ground], task.pheromone, levels)}
+        self.take(task, learns)
+        self.kinds = kinds_of_food(world)
+        self.loads = {cell: self.full(kind) for cell, kind in self.kinds.items()}
+
+    def take(self, task: Task, learns: bool) -> None:
+        """Take the numbers of a task, and present rocks; pheromones keep their levels."""
+        self.foods = list(task.foods.values())
+        self.cues = [
+            (caste.outbound_cue or task.outbound_cue, caste.homing_cue or task.homing_cue)
+            for caste in task.castes.values() or [Caste()]
+        ]
+        falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
+        cells, levels = [c for c, held in self.ground.items() if held != OBSTACLE], self.pheromones
+        self.pheromones = {
+            name: Trail(
+                cells,
+                rule if falls else rule.lasting,
+                {cell: levels[name].level(cell) for cell in cells} if name in levels else {},
+                task.rules,
+            )
+            for name, rule in {"trail": task.pheromone, **task.fields}.items()
         }
-        self.cues = cues
+
+    @property
+    def trail(self) -> Trail:
+        """The trail."""
+        return self.pheromones["trail"]
 
     def has_compass(self, ant: Ant) -> bool:
         """Return whether an ant with this load looks for cells nearer to the queen."""
@@ -180,25 +185,7 @@ class WorldState:
         """Return the pheromone that an ant follows; with a compass, that of ants without food."""
         outbound, homing = self.cues[ant.caste]
         uses_homing = ant.carries and homing != "compass"
-        return self.pheromone_named(homing if uses_homing else outbound)
-
-    @property
-    def pheromones(self) -> dict[str, Trail]:
-        """The trail and the further fields, by name."""
-        return {"trail": self.trail, **self.fields}
-
-    def pheromone_named(self, name: str) -> Trail:
-        """Return the trail, or a further field."""
-        return self.trail if name == "trail" else self.fields[name]
-
-    @property
-    def queen(self) -> Cell:
-        """The queen of the first nest."""
-        return self.queens[0]
-
-    @queen.setter
-    def queen(self, cell: Cell) -> None:
-        self.queens[0] = cell
+        return self.pheromones[homing if uses_homing else outbound]
 
     def full(self, kind: int) -> int:
         """Return the number of loads in a full cell of a kind of food."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from taichi_ants.records import Snapshot
 from taichi_ants.rendering import colours
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.task.field import TRAIL
 
 # Sizes of hexagons are in pixels, from the centre to a corner.
 # At this size and above, food and queen are drawings on a light background. In smaller cells, food
@@ -32,6 +34,7 @@ _QUEEN, _QUEEN_OUTLINE = 2.5, 7.0  # pixels, the queen's minimum radius and that
 _DOTS_BELOW = 2.5  # size of a hexagon below which ants are dots
 _DARTS_BELOW = 11.0  # size below which ants are darts
 _DOT = 0.9  # pixels, the minimum radius of a dot
+_THING = 0.72  # radius of food and queens as a share of their hexagon
 _FILL = 0.83  # radius of an ant as a share of its hexagon, whose inner circle has 0.866
 
 # Colours of cells by their letters in states.
@@ -69,11 +72,6 @@ def marks(
     return table
 
 
-def marker(places: npt.ArrayLike, hexagon: float, mark: Mark, colour: np.ndarray) -> np.ndarray:
-    """Return marks of food or queens; cells have the radius `hexagon`, in pixels."""
-    return marks(places, 0.72 * hexagon, mark, colour)
-
-
 def cell_colour(letter: str) -> int:
     """Return the colour of a cell by its letter in a state; unknown letters look empty."""
     return _CELLS.get(letter[0], colours.CELL_EMPTY)
@@ -85,7 +83,7 @@ def cell(letter: str, centre: npt.ArrayLike, hexagon: float, number: int = 0) ->
         return marks(centre, hexagon, Mark.HEXAGON, cell_colour(letter))
     mark, of_things, floors = _THINGS[letter]
     floor = marks(centre, hexagon, Mark.HEXAGON, floors[number])
-    return np.concatenate([floor, marker(centre, hexagon, mark, of_things[number])])
+    return np.concatenate([floor, marks(centre, _THING * hexagon, mark, of_things[number])])
 
 
 def ants(
@@ -126,13 +124,8 @@ def _launch(kernel: str, *arguments: object) -> None:
 
 def _things_of(snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return flat indices and kinds of food items, and flat indices of queens by nest."""
-    foods, kinds, queens = (
-        np.flatnonzero(snapshot.ground == FOOD),
-        snapshot.food_kinds,
-        snapshot.queens,
-    )
-    if not len(queens):
-        queens = np.flatnonzero(snapshot.ground == QUEEN)
+    foods, kinds = np.flatnonzero(snapshot.ground == FOOD), snapshot.food_kinds
+    queens = snapshot.queens if len(snapshot.queens) else np.flatnonzero(snapshot.ground == QUEEN)
     return foods, kinds[foods] if len(kinds) else 0 * foods, queens
 
 
@@ -146,8 +139,8 @@ class Rasteriser:
         grid: The grid of all worlds to draw.
         width, height, margin: The size of the pictures and the margin on each side, in pixels.
         beyond: Leave space for the cells just outside the border of the world.
-        strongest: The trail level of the darkest colour; None fits it to each picture.
-        of_fields: The same for further fields, by name; `strongest` for those that it lacks.
+        strongest: The level of the darkest colour of fields by name, by default that of a deposit;
+            None fits it to each picture.
 
     Attributes:
         hexagon: Pixels from the centre of a cell to its corners.
@@ -160,10 +153,9 @@ class Rasteriser:
         height: int,
         margin: float = 0.0,
         beyond: bool = False,
-        strongest: int | None = DEPOSIT_LEVEL,
-        of_fields: Mapping[str, int | None] | None = None,
+        strongest: Mapping[str, int | None] | None = None,
     ) -> None:
-        self.grid, self._strongest, self._of_fields = grid, strongest, of_fields or {}
+        self.grid, self._strongest = grid, strongest or {}
         self.width, self.height = width, height
         x_range, y_range, z_range = grid.ranges
         # The lowest and the highest (x, y), relative to cell (0, 0, 0) in hexagon sizes. In
@@ -175,8 +167,6 @@ class Rasteriser:
         size = np.array([width, height])
         self.hexagon = float((np.maximum(size - 2 * margin, 1) / (high - low)).min())
         self._origin = size / 2 - self.hexagon * (low + high) / 2
-        self._page = np.full((height, width, 3), colours.channels(colours.PAGE))
-        self._drawn: tuple[np.ndarray, np.ndarray] | None = None  # colours of cells, their picture
 
     def centres(self, cells: object) -> np.ndarray:
         """Return pixel coordinates of the centres of cells (..., 3), float64 (..., 2)."""
@@ -199,8 +189,8 @@ class Rasteriser:
             tables.append(marks(foods, radius, Mark.DOT, of_foods))
             tables.append(marks(queens, max(hexagon, _QUEEN), Mark.DOT, of_queens))
         else:
-            tables.append(marker(foods, hexagon, Mark.FOOD, of_foods))
-            tables.append(marker(queens, hexagon, Mark.QUEEN, of_queens))
+            tables.append(marks(foods, _THING * hexagon, Mark.FOOD, of_foods))
+            tables.append(marks(queens, _THING * hexagon, Mark.QUEEN, of_queens))
         if in_view is not None:
             places, radius = self._places(in_view), 0.98 * hexagon
             if hexagon < _SMALLEST_OUTLINE:
@@ -216,14 +206,9 @@ class Rasteriser:
         return frame
 
     def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
-        """Return a picture of cells in these colours, uint32 (grid.size,); cache the picture."""
-        if self._drawn is None or not np.array_equal(self._drawn[0], of_cells):
-            self._drawn = of_cells.copy(), self._cells(of_cells)
-        return self._drawn[1].copy()
-
-    def _cells(self, of_cells: np.ndarray) -> np.ndarray:
+        """Return a picture of cells in these colours, uint32 (grid.size,)."""
         grid, hexagon = self.grid, self.hexagon
-        frame = self._page.copy()
+        frame = np.full((self.height, self.width, 3), colours.channels(colours.PAGE))
         if hexagon < _DOTS_BELOW:
             layout = (*self._origin.tolist(), hexagon, grid.width, grid.height, grid.ranges[2])
             _launch("draw_small_cells", frame, of_cells, *layout)
@@ -232,10 +217,8 @@ class Rasteriser:
         line = min(max(0.09 * hexagon - 0.25, 0.0), 3.0)
         # The page shows through the smooth edges of neighbours, so a narrow line needs less space.
         gap = line if line > 1 else 2 * math.sqrt(line) - 1
-        existing = np.flatnonzero(grid.exists)
-        radius = hexagon - gap / _SQRT_3
-        places = self._places(existing)
-        draw_marks(frame, marks(places, radius, Mark.HEXAGON, of_cells[existing]))
+        existing, radius = np.flatnonzero(grid.exists), hexagon - gap / _SQRT_3
+        draw_marks(frame, marks(self._places(existing), radius, Mark.HEXAGON, of_cells[existing]))
         return frame
 
     def cell_colours(self, snapshot: Snapshot) -> np.ndarray:
@@ -247,26 +230,24 @@ class Rasteriser:
         of_cells[foods] = colours.FOOD_FLOORS[kinds]
         small = self.hexagon < _SMALLEST_DRAWING
         of_cells[queens] = (colours.QUEENS if small else colours.QUEEN_FLOORS)[: len(queens)]
-        ramps = [(colours.TRAIL_RAMP, snapshot.trail, self.darkest(snapshot.trail))]
-        ramps += [
-            (colours.field_ramp(number), levels, self.darkest(levels, name))
-            for number, (name, levels) in enumerate(snapshot.further_fields.items())
-        ]
-        for ramp, of_field, strongest in reversed(ramps):  # the trail covers further fields
+        fields = [(TRAIL, snapshot.trail), *snapshot.further_fields.items()]
+        for number, (name, of_field) in reversed([*enumerate(fields, start=-1)]):
+            # The trail, which comes last, covers further fields.
+            ramp = colours.TRAIL_RAMP if name == TRAIL else colours.field_ramp(number)
             marked = np.flatnonzero((snapshot.ground == EMPTY) & (of_field >= 1))
             levels = of_field[marked].astype(np.float32)
-            share = np.minimum(levels / np.float32(strongest), 1)
+            share = np.minimum(levels / np.float32(self.darkest(name, of_field)), 1)
             of_cells[marked] = ramp[(share * 255 + 0.5).astype(np.int32)]
         of_cells[~self.grid.exists] = colours.PAGE
         return of_cells
 
-    def darkest(self, levels: np.ndarray, field: str = "") -> int:
-        """Return the level of the darkest colour of a further field, or of the trail.
+    def darkest(self, field: str, levels: np.ndarray) -> int:
+        """Return the level of the darkest colour of a field.
 
         A level that fits is 1, 2 or 5 times a power of 10, so it changes rarely in an animation;
         at most 5 % of the visible levels are above it.
         """
-        fixed = self._of_fields.get(field, self._strongest)
+        fixed = self._strongest.get(field, DEPOSIT_LEVEL)
         if fixed is not None:
             return fixed
         seen = levels[levels >= 1]
@@ -286,11 +267,10 @@ class Rasteriser:
             world = self.grid.count * 1.5 * _SQRT_3 * hexagon**2
             covered = len(places) * math.pi * _DOT**2 / world
             opacity = min(1.0, 0.5 * max(covered, 1e-9) ** -0.6)
-        colour: int | np.ndarray = colours.ANT
+        look: dict[str, Any] = {}
         if len(snapshot.ant_nests):
-            colour = colours.ANTS[snapshot.ant_nests]
-        load: int | np.ndarray = colours.CELL_FOOD
+            look["colour"] = colours.ANTS[snapshot.ant_nests]
         if len(snapshot.ant_foods):
-            load = colours.FOODS[np.maximum(snapshot.ant_foods, 0)]
-        look = snapshot.ant_headings, snapshot.ant_carries, hexagon
-        return ants(places, *look, opacity=opacity, colour=colour, load=load)
+            look["load"] = colours.FOODS[np.maximum(snapshot.ant_foods, 0)]
+        poses = snapshot.ant_headings, snapshot.ant_carries
+        return ants(places, *poses, hexagon, opacity=opacity, **look)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -129,27 +128,20 @@ class Scene:
     ) -> None:
         expect("grid", grid, AxialGrid)
         expect("task", task, Task, type(None))
-        of_fields = {name: _scale(field) for name, field in task.fields.items()} if task else {}
-        self._foods = list(task.foods) if task else []
-        width, height = check_size(size)
-        self._overlay, letters = overlay, round(min(width, height) / 38)
-        self._background = np.full((height, width, 3), colours.channels(colours.PAGE))
-        margin = max(2, round(min(width, height) / 60))
-        self._has_panel = overlay and letters >= text.SMALLEST
+        self._task, self._title, self._overlay = task, title, overlay
+        fields = {} if task is None else {TRAIL: task.pheromone, **task.fields}
+        scales = {TRAIL: strongest, **{name: _scale(field) for name, field in fields.items()}}
+        width, self._height = check_size(size)
+        shorter = min(size)
+        letters, margin = round(shorter / 38), max(2, round(shorter / 60))
+        self._panel: tuple[int, int, int] | None = None  # left edge, width, text size
         room = width  # pixels for the world, on the left
-        if self._has_panel:
+        if overlay and letters >= text.SMALLEST:
             room -= _PANEL_WIDTH * letters + margin
-        self._rasteriser = Rasteriser(
-            *(grid, room, height, margin, view and overlay),
-            *(_scale(task.pheromone) if task else strongest, of_fields),
-        )
-        if self._has_panel:
-            self._panel = room, width - margin - room, letters  # left edge, width, text size
-            self._top = margin + round(_TITLE_HEIGHT * letters) * bool(title)
-            self._legend_top = height - margin - round(_LEGEND_HEIGHT * letters)
-            place = room, margin + letters, letters
-            text.write(self._background, title, *place, room=width - margin - room)
-            self._scale_line = self._draw_legend(task.homing_cue if task else COMPASS)
+            self._panel = room, width - margin - room, letters
+        self._width, self._margin = width, margin
+        beyond = view and overlay
+        self._rasteriser = Rasteriser(grid, room, self._height, margin, beyond, scales)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """Return the picture of a snapshot and its panel, uint8 (height, width, 3).
@@ -165,43 +157,32 @@ class Scene:
                 f"{self._rasteriser.grid.ranges}; use a Scene of the same grid."
             )
         world = self._draw_world(snapshot, status)
-        frame = self._background.copy()
+        if self._panel is None:
+            return world
+        frame = np.full((self._height, self._width, 3), colours.channels(colours.PAGE))
         frame[:, : world.shape[1]] = world
-        if self._has_panel and status is not None:
-            _draw_status(frame, status, self._top, *self._panel)
-        if self._has_panel:
-            further = self._further_entries(snapshot)
-            self._draw_entries(frame, further, -len(further))
-            left, width, size = self._panel
-            most, y = f"{self._rasteriser.darkest(snapshot.trail)} and more", self._scale_line
-            text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
+        left, width, size = self._panel
+        text.write(frame, self._title, left, self._margin + size, size, room=width)
+        if status is not None:
+            top = self._margin + round(_TITLE_HEIGHT * size) * bool(self._title)
+            _draw_status(frame, status, top, *self._panel)
+        self._draw_legend(frame, snapshot, *self._panel)
         return frame
 
-    def _draw_legend(self, homing_cue: str) -> int:
-        """Return the y of the text below the ramp, after drawing what all pictures explain."""
-        (left, width, size), frame = self._panel, self._background
-        cue = "trail (S)" if homing_cue == TRAIL else f"field {homing_cue} (S)"
-        told = homing_cue == COMPASS  # by the label
-        entries = [
-            entry._replace(label=cue) if entry.letter and not told else entry for entry in _LEGEND
-        ]
-        self._draw_entries(frame, entries, 0)
-        y = self._legend_top + len(entries) * round(_PITCH * size) + round(1.45 * size)
-        text.write(frame, "trail (T), by strength", left, y, size)
-        y += round(0.45 * size)
-        columns = np.linspace(0, len(colours.TRAIL_RAMP) - 1, width).astype(int)
-        ramp = colours.channels(colours.TRAIL_RAMP[columns])
-        frame[y : y + round(0.7 * size), left : left + width] = ramp
-        y += round(1.75 * size)
-        text.write(frame, "1", left, y, size, colours.FAINT_INK)
-        return y
-
-    def _draw_entries(self, frame: np.ndarray, entries: Sequence[_Entry], first: int) -> None:
-        """Draw entries of the legend; row 0 is its first entry, and further ones are above it."""
-        (left, _, size), hexagon = self._panel, self._rasteriser.hexagon
-        x, radius = left + 0.85 * size, 0.82 * size
-        for row, entry in enumerate(entries, start=first):
-            y = self._legend_top + row * round(_PITCH * size) + 0.75 * size
+    def _draw_legend(
+        self, frame: np.ndarray, snapshot: Snapshot, left: int, width: int, size: int
+    ) -> None:
+        """Draw the legend, which grows upwards with its entries."""
+        cue = self._task.homing_cue if self._task else COMPASS
+        entries = [*self._further_entries(snapshot), *_LEGEND]
+        if cue != COMPASS:
+            label = "trail (S)" if cue == TRAIL else f"field {cue} (S)"
+            entries = [entry._replace(label=label) if entry.letter else entry for entry in entries]
+        pitch, radius = round(_PITCH * size), 0.82 * size
+        x, hexagon = left + 0.85 * size, self._rasteriser.hexagon
+        first = self._height - self._margin - round(_LEGEND_HEIGHT * size) + len(_LEGEND) * pitch
+        for row, entry in enumerate(entries, start=-len(entries)):
+            y = first + row * pitch + 0.75 * size
             ant_x, label_x = x, left + round(2.1 * size)
             strongest = int(colours.field_ramp(entry.number)[-1])
             field = marks((x, y), radius, Mark.HEXAGON, strongest)
@@ -215,18 +196,29 @@ class Scene:
             baseline = round(y + 0.36 * size)
             text.write(frame, entry.letter, x, baseline, size, align="middle")
             text.write(frame, entry.label, label_x, baseline, size)
+        y = first + round(1.45 * size)
+        text.write(frame, "trail (T), by strength", left, y, size)
+        y += round(0.45 * size)
+        columns = np.linspace(0, len(colours.TRAIL_RAMP) - 1, width).astype(int)
+        ramp = colours.channels(colours.TRAIL_RAMP[columns])
+        frame[y : y + round(0.7 * size), left : left + width] = ramp
+        y += round(1.75 * size)
+        most = f"{self._rasteriser.darkest(TRAIL, snapshot.trail)} and more"
+        text.write(frame, "1", left, y, size, colours.FAINT_INK)
+        text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
 
     def _further_entries(self, snapshot: Snapshot) -> list[_Entry]:
         """Return entries of further fields, several nests and several kinds of food."""
         further = [
-            _Entry(f"field {name}, {self._rasteriser.darkest(levels, name)} and more", "", number)
+            _Entry(f"field {name}, {self._rasteriser.darkest(name, levels)} and more", "", number)
             for number, (name, levels) in enumerate(snapshot.further_fields.items())
         ]
         if len(snapshot.queens) > 1:
             nests = range(len(snapshot.queens))
             further += [_Entry(f"nest {n}", "Q", n, ant=False) for n in nests]
         kinds = 1 if snapshot.world is None else snapshot.world.n_food_kinds
-        foods = self._foods or [f"of kind {n}" for n in range(kinds)]
+        named = self._task.foods if self._task else ()
+        foods = [*named] or [f"of kind {n}" for n in range(kinds)]
         if len(foods) > 1:
             further += [_Entry(f"food {name}", "F", n) for n, name in enumerate(foods)]
         return further

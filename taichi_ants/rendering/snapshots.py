@@ -20,8 +20,8 @@ from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.records import Snapshot
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene, Status, name_parts
-from taichi_ants.task import Observation, Task
-from taichi_ants.task.constants import ACTION_NAMES, EPISODE_STEPS, N_ACTIONS
+from taichi_ants.task import Observation
+from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.worlds.world import World
 
 CaptionedSnapshot = tuple[Snapshot, Status]
@@ -59,9 +59,8 @@ def frames(
     """
     scene = None
     for snapshot, status in snapshots:
-        scene = scene or Scene(
-            snapshot.grid, size, view=getattr(status, "state", None) is not None, **look
-        )
+        view = getattr(status, "state", None) is not None
+        scene = scene or Scene(snapshot.grid, size, view=view, **look)
         yield scene.draw(snapshot, status)
 
 
@@ -73,19 +72,11 @@ class Episode:
     name: str  # in the panel
 
     @classmethod
-    def play(
-        cls,
-        world: World,
-        q_values: np.ndarray,
-        *,
-        seed: int = 0,
-        max_steps: int = EPISODE_STEPS,
-        task: Task | None = None,
-        epsilon: float = 0.0,
-    ) -> Episode:
-        """Return a rollout of a policy; arguments and errors are those of `rollout`."""
-        trace = rollout(world, q_values, seed, 0, max_steps, task, epsilon)
-        return cls(trace, "greedy" if epsilon == 0 else f"epsilon {epsilon:g}")
+    def play(cls, world: World, q_values: np.ndarray, **rules: Any) -> Episode:
+        """Return rollout 0 of a policy; `rules` and errors are those of `rollout`."""
+        epsilon = rules.get("epsilon", 0.0)
+        name = f"epsilon {epsilon:g}" if epsilon else "greedy"
+        return cls(rollout(world, q_values, **rules), name)
 
     @property
     def arguments(self) -> RolloutArguments:
@@ -104,26 +95,21 @@ class Episode:
 
     def snapshots(self) -> Iterator[CaptionedSnapshot]:
         """Yield the world before each step, with the action that follows, and at the end."""
-        colony = colony_of_rollout(self.arguments)
-        returns = np.concatenate([[0], np.cumsum(self.trace.rewards)]).tolist()
-        for step, gained in enumerate(returns):
+        colony, trace = colony_of_rollout(self.arguments), self.trace
+        table, sees = colony.q_values[0], self.arguments.task.sees
+        states = [*trace.states.tolist(), int(trace.next_states[-1])]
+        actions = [*trace.actions.tolist(), None]
+        returns = [0, *np.cumsum(trace.rewards).tolist()]
+        for step, (state, action, gained) in enumerate(zip(states, actions, returns, strict=True)):
             if step:
                 colony.tick()
-            yield colony.snapshot(), self._status(step, gained)
-
-    def _status(self, step: int, gained: int) -> Status:
-        trace, going_on = self.trace, step < len(self.trace)
-        state = int(trace.states[step] if going_on else trace.next_states[-1])
-        action = int(trace.actions[step]) if going_on else None
-        lines = [("episode", self.name), ("step", str(step)), ("return", str(gained))]
-        last = []
-        if action is not None:
-            last = [("action", ACTION_NAMES[action])]
-        elif self.delivered:
-            last = [("outcome", "delivered")]
-        table, sees = self.arguments.q_values, self.arguments.task.sees
-        assert table is not None
-        return _status_of(sees, state, table[state], action, trace.q_values, lines, last)
+            lines = [("episode", self.name), ("step", str(step)), ("return", str(gained))]
+            last = [] if action is None else [("action", ACTION_NAMES[action])]
+            if action is None and self.delivered:
+                last = [("outcome", "delivered")]
+            q_values = table[state]
+            status = _status_of(sees, state, q_values, action, trace.q_values, lines, last)
+            yield colony.snapshot(), status
 
 
 def colony_of_rollout(arguments: RolloutArguments) -> Colony:

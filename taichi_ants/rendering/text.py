@@ -39,18 +39,20 @@ def write(
     """
     if size < SMALLEST:
         return
+    from PIL import Image, ImageDraw
+
     text = text if room is None else shortened(text, size, room)
-    moved = {"left": 0.0, "middle": 0.5, "right": 1.0}[align] * width(text, size)
-    mask, dx, dy = _mask(text, size)
-    left, top = round(x - moved) + dx, round(baseline) + dy
-    y0, x0 = max(0, -top), max(0, -left)
-    y1 = min(mask.shape[0], frame.shape[0] - top)
-    x1 = min(mask.shape[1], frame.shape[1] - left)
-    if y0 < y1 and x0 < x1:
-        share = mask[y0:y1, x0:x1]
-        part = frame[top + y0 : top + y1, left + x0 : left + x1]
-        ink = channels(colour).astype(np.float32)
-        part[:] = part + share * (ink - part) + np.float32(0.5)
+    start = {"left": 0.0, "middle": 0.5, "right": 1.0}[align] * width(text, size)
+    left, line = round(x - start), round(baseline)
+    right = left + round(width(text, size)) + size
+    # Only a part of the frame becomes an image, because images are copies.
+    x0, y0 = max(0, left - size), max(0, line - 2 * size)
+    part = frame[y0 : max(y0, line + size), x0 : max(x0, right)]
+    if part.size:
+        image = Image.fromarray(part)
+        ink, at = tuple(channels(colour).tolist()), (left - x0, line - y0)
+        ImageDraw.Draw(image).text(at, _plain(text), ink, _font(size), anchor="ls")
+        part[:] = image
 
 
 def write_on(
@@ -88,16 +90,3 @@ def _font(size: int) -> FreeTypeFont | ImageFont:
     from PIL.ImageFont import load_default
 
     return load_default(size)
-
-
-@lru_cache(maxsize=4096)
-def _mask(text: str, size: int) -> tuple[np.ndarray, int, int]:
-    """Return coverage, 0 to 1, float32 (height, width, 1), and the offset of its corner."""
-    from PIL import Image, ImageDraw
-
-    text = _plain(text)
-    left, top, right, bottom = _font(size).getbbox(text, anchor="ls")
-    x, y = int(left) - 1, int(top) - 1
-    image = Image.new("L", (int(right) - x + 2, int(bottom) - y + 2))
-    ImageDraw.Draw(image).text((-x, -y), text, fill=255, font=_font(size), anchor="ls")
-    return np.asarray(image, dtype=np.float32)[:, :, None] / np.float32(255), x, y

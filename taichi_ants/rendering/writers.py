@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, BinaryIO
@@ -43,30 +41,15 @@ def check_animation(path: files.PathLike, fps: Fps = 8.0) -> Path:
     """Return the path of an animation after checking that it can be written.
 
     Args:
-        path: A .gif or .mp4 file; without an extension, a new folder for numbered PNG pictures.
+        path: A .gif or .mp4 file.
         fps: Frames per second, 0.1 to 50.
 
     Raises:
         AntsError: An argument is not allowed, the path is not writable, or PyAV is missing.
     """
-    expect("path", path, str, os.PathLike)
-    target = Path(path)
-    if target.suffix.lower() not in (".gif", ".mp4", ""):
-        raise AntsError(
-            f"{str(path)!r} ends in {target.suffix!r}; an animation must end in .gif or .mp4, or "
-            "have no extension to make a folder of PNG pictures."
-        )
+    target = check_file(path, "an animation", *_ENCODERS)
     if target.suffix.lower() == ".mp4":
         imported("an MP4 file", "av", "video")
-    if target.suffix or not os.path.lexists(target):
-        return files.check_writable_file(target)
-    files.check_writable_folder(target.absolute().parent)
-    named = target.name not in ("", "..") and not target.is_symlink()
-    if not (named and target.is_dir() and not any(target.iterdir())):
-        raise AntsError(
-            f"{str(path)!r} already exists and is not an empty folder; choose a new folder, or a "
-            "file that ends in .gif or .mp4."
-        )
     return target
 
 
@@ -77,15 +60,16 @@ def is_picture(path: files.PathLike) -> bool:
 
 def check_picture(path: files.PathLike) -> Path:
     """Return the path of a picture after checking it; raises as `save_picture` does."""
-    return check_single(path, "one picture", ".png")
+    return check_file(path, "one picture", ".png")
 
 
-def check_single(path: files.PathLike, holds: str, *endings: str) -> Path:
+def check_file(path: files.PathLike, holds: str, *endings: str) -> Path:
     """Return a path after checking its extension and that it is writable; AntsError if not."""
     target = files.check_writable_file(path)
     if target.suffix.lower() not in endings:
         raise AntsError(
-            f"{str(path)!r} cannot hold {holds}; choose a file name that ends in {endings[0]}."
+            f"{str(path)!r} cannot hold {holds}; choose a file name that ends in "
+            f"{' or '.join(endings)}."
         )
     return target
 
@@ -98,10 +82,10 @@ def save_animation(
     *,
     pause: Annotated[float, Setting(least=0, most=60)] = 0.0,
 ) -> None:
-    """Write an animation frame by frame; checks and raises as `check_animation` does.
+    """Write an animation; checks and raises as `check_animation` does.
 
     Args:
-        path: The file or folder, see `check_animation`. An existing file is replaced.
+        path: The file, see `check_animation`. An existing file is replaced.
         frames: One or more frames, uint8 (height, width, 3), all of the same size.
         fps: Frames per second.
         pause: Seconds, at most 60, for which the last frame is shown before the animation repeats.
@@ -109,21 +93,9 @@ def save_animation(
     target = check_animation(path, fps)
     expect("frames", frames, Iterable)
     checked = _checked(frames, round(pause * fps) - 1)
-    encode = _mp4 if target.suffix.lower() == ".mp4" else _gif
-    missing = [folder for folder in target.absolute().parents if not folder.exists()]
-    try:
-        files.check_writable_folder(target.parent)
-        if target.suffix:
-            first = next(checked)
-            every = chain([first], checked)
-            files.write_atomically(target, lambda file: encode(file, first, every, fps))
-        else:
-            _write_folder(target, checked)
-    except BaseException:
-        for folder in missing:
-            with suppress(OSError):
-                folder.rmdir()
-        raise
+    content, first = io.BytesIO(), next(checked)
+    _ENCODERS[target.suffix.lower()](content, first, chain([first], checked), fps)
+    write(target, content.getvalue())
 
 
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
@@ -133,8 +105,7 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
         AntsError: The file does not end in .png, or is not writable.
     """
     target = check_picture(path)
-    _check_frame(frame)
-    write(target, png(frame, optimize=True))
+    write(target, png(next(_checked([frame])), optimize=True))
 
 
 def write(target: Path, content: bytes) -> None:
@@ -143,41 +114,22 @@ def write(target: Path, content: bytes) -> None:
     files.write_atomically(target, lambda file: file.write(content))
 
 
-def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
-    """Write numbered pictures to a folder that appears only once it is complete."""
-    with files.writing(folder), files.unfinished(folder) as whole:
-        whole.mkdir()
-        for number, frame in enumerate(frames):
-            (whole / f"frame_{number:06d}.png").write_bytes(png(frame))
-        if folder.exists():
-            folder.rmdir()  # `check_animation` has checked that it is empty
-        os.replace(whole, folder)
-
-
-def _checked(frames: Iterable[np.ndarray], more: int) -> Iterator[np.ndarray]:
+def _checked(frames: Iterable[np.ndarray], more: int = 0) -> Iterator[np.ndarray]:
     """Yield the frames after checking their shapes, and the last one `more` times again."""
-    shape = None
+    frame = shape = None
     for number, frame in enumerate(frames):
-        _check_frame(frame)
+        expect("a frame", frame, np.ndarray)
         shape = shape or frame.shape
-        if frame.shape != shape:
+        if frame.dtype != np.uint8 or shape[2:] != (3,) or 0 in shape or frame.shape != shape:
             raise AntsError(
-                f"frame {number} has shape {frame.shape}, but frame 0 has {shape}; give all frames "
-                "the same shape."
+                f"frame {number} is {frame.dtype} {frame.shape}; all frames must be uint8 (height, "
+                "width, 3) of one size."
             )
         yield frame
-    if shape is None:
+    if frame is None:
         raise AntsError("frames is empty; give at least one frame.")
     for _ in range(more):
         yield frame
-
-
-def _check_frame(frame: np.ndarray) -> None:
-    expect("a frame", frame, np.ndarray)
-    if frame.dtype != np.uint8 or frame.shape[2:] != (3,) or 0 in frame.shape:
-        raise AntsError(
-            f"a frame is {frame.dtype} {frame.shape}; it must be uint8 (height, width, 3)."
-        )
 
 
 def png(frame: np.ndarray, optimize: bool = False) -> bytes:
@@ -251,3 +203,7 @@ def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: f
             video = video.reformat(format="yuv420p", dst_colorspace="ITU709")
             container.mux(stream.encode(video))
         container.mux(stream.encode())
+
+
+# Functions that write frames into a file, by its ending.
+_ENCODERS = {".gif": _gif, ".mp4": _mp4}

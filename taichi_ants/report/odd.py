@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from taichi_ants import files, learners
-from taichi_ants.analysis.tables import Block, Table, markdown
+from taichi_ants.analysis.tables import Table
 from taichi_ants.errors import AntsError
 from taichi_ants.measures import finished
 from taichi_ants.settings import DeclaredSetting, declared, flat
@@ -23,11 +24,6 @@ from taichi_ants.task import observations
 Row = tuple[str, ...]
 
 _MOST = 6  # values of a setting in a cell, and worlds in the table
-_AUTHOR = "*[Text of the author]*"
-_CONCEPTS = (
-    *("Basic principles", "Emergence", "Adaptation", "Objectives", "Learning", "Prediction"),
-    *("Sensing", "Interaction", "Stochasticity", "Collectives", "Observation"),
-)
 _OF_POINTS = {  # settings of points: unit and meaning
     "world.preset": ("", "name of the world, or its map"),
     "world.seed": ("", "seed from which the world is drawn"),
@@ -127,12 +123,17 @@ class Model:
 
     def parameters(self) -> list[Row]:
         """Return the names, values, units and meanings of all settings that have an effect."""
-        varied = [{k: v for k, v in row.items() if k.startswith("world")} for row in self._vary()]
+        vary = self.settings.get("vary") or [{"world_kinds": self.settings.get("world_kinds")}]
+        varied = [{k: v for k, v in row.items() if k.startswith("world")} for row in vary]
         rows = [self.world, *varied, *self.rows]
         table: list[Row] = []
         for name in dict.fromkeys(name for row in rows for name in row):
             event = _EVENT.match(name)
-            some = [entry for entry in rows if name in entry or (event and _has(entry, event[1]))]
+            some = [
+                row
+                for row in rows
+                if name in row or (event and any(other.startswith(event[1]) for other in row))
+            ]
             setting = self.declaration(name, some[0])
             default = setting.default if setting else None  # facts of events leave out defaults
             values = [row.get(name, default) for row in some if self.uses(row, name, setting)]
@@ -141,9 +142,6 @@ class Model:
                 unit, words = (setting.rule.unit, setting.rule.help) if setting else (unit, words)
                 table.append((f"`{name}`", _several(values), unit, words))
         return table
-
-    def _vary(self) -> Sequence[Mapping[str, Any]]:
-        return self.settings.get("vary") or [{"world_kinds": self.settings.get("world_kinds")}]
 
     def entries(self, group: str) -> list[str]:
         """Return the names of the entries of a named group of the task, such as its fields."""
@@ -229,45 +227,30 @@ def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
         for world in model.places[:_MOST]
     ]
     of_worlds = ("Ranges", "Food items", "Rock", "Trail cells", "Listed ants", "Nests", "SHA-256")
-    more: dict[str, Block] = {
-        "Stochasticity": f"Seeds: {', '.join(map(str, model.settings['seeds']))}",
-        "Observation": _table(("Measure", "Meaning"), model.measures()),
-    }
-    blocks: list[Block] = [
-        "# ODD description of the model",
-        "The headings are those of the ODD protocol (Overview, Design concepts, Details) of "
-        "[Grimm et al. (2020)](https://www.jasss.org/23/2/7.html). The tables were generated from "
-        f"the settings of this study: `{command}`. They leave out most settings that are off or "
-        "have no effect in it, and defaults of the world and of the capacity. The text is yours to "
-        "write.",
-        *("## 1. Purpose and patterns", _AUTHOR),
-        *("## 2. Entities, state variables and scales", _AUTHOR),
-        _table(("Entity", "Number in a world"), model.entities()),
-        _table(("Entity", "State variable", "Values", "Unit"), model.state_variables()),
-        *("## 3. Process overview and scheduling", _AUTHOR, "## 4. Design concepts"),
-        *(
-            block
-            for number, concept in enumerate(_CONCEPTS, start=1)
-            for block in (f"### 4.{number} {concept}", _AUTHOR, more.get(concept, ""))
+    parts = {
+        "command": command,
+        "entities": _table(("Entity", "Number in a world"), model.entities()),
+        "state_variables": _table(
+            ("Entity", "State variable", "Values", "Unit"), model.state_variables()
         ),
-        *("## 5. Initialization", _AUTHOR, _table(of_worlds, worlds)),
-        f"{len(model.places)} worlds; the manifest has all." if model.places[_MOST:] else "",
-        *("## 6. Input data", _AUTHOR),
-        _table(("Event", *heads[1:]), [row for row in rows if _EVENT.match(row[0])]),
-        *("## 7. Submodels", _AUTHOR),
-        _table(heads, [row for row in rows if not _EVENT.match(row[0])]),
-        _table(("File", "SHA-256 begins"), sources),
-    ]
-    return markdown([item for item in blocks if (item if isinstance(item, str) else item.rows)])
+        "seeds": ", ".join(map(str, model.settings["seeds"])),
+        "measures": _table(("Measure", "Meaning"), model.measures()),
+        "worlds": _table(of_worlds, worlds),
+        "more_worlds": f"{len(model.places)} worlds; the manifest has all."
+        if model.places[_MOST:]
+        else "",
+        "events": _table(("Event", *heads[1:]), [row for row in rows if _EVENT.match(row[0])]),
+        "parameters": _table(heads, [row for row in rows if not _EVENT.match(row[0])]),
+        "sources": _table(("File", "SHA-256 begins"), sources),
+    }
+    template = resources.files(__package__).joinpath("odd.md").read_text(encoding="utf-8")
+    return re.sub("\n{3,}", "\n\n", template.format(**parts)).rstrip() + "\n"
 
 
-def _table(heads: Row, rows: Iterable[Row]) -> Table:
+def _table(heads: Row, rows: Iterable[Row]) -> str:
+    """Return a table as Markdown, "" without rows."""
     cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
-    return Table("", heads, cells, text_columns=len(heads))
-
-
-def _has(row: Mapping[str, Any], start: str) -> bool:
-    return any(name.startswith(start) for name in row)
+    return Table("", heads, cells, text_columns=len(heads)).markdown().rstrip()
 
 
 def _nests(world: Mapping[str, Any]) -> int:

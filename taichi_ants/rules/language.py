@@ -18,22 +18,18 @@ import ast
 import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping
+from functools import reduce
 from textwrap import dedent
-from typing import Any
+from typing import Any, NoReturn
 
 # Numbers of arguments; the first argument of `pick` is a vector.
 FUNCTIONS = {"exp": 1, "log": 1, "power": 2, "pick": 2, "min": 2, "max": 2, "abs": 1}
 _MOST_REPEATS = 256  # of the body of the innermost loop
-_OPERATORS = {ast.Add: "{} + {}", ast.Sub: "{} - {}", ast.Mult: "{} * {}", ast.Div: "{} / {}"}
-_OPERATORS |= {ast.FloorDiv: "ti.floor({} / {})", ast.Mod: "modulo({}, {})"}
-_COMPARISONS = {
-    ast.Lt: "<",
-    ast.LtE: "<=",
-    ast.Gt: ">",
-    ast.GtE: ">=",
-    ast.Eq: "==",
-    ast.NotEq: "!=",
-}
+_OPERATORS: dict[type, str] = {ast.Add: "{} + {}", ast.Sub: "{} - {}", ast.Mult: "{} * {}"}
+_OPERATORS |= {ast.Div: "{} / {}", ast.FloorDiv: "ti.floor({} / {})", ast.Mod: "modulo({}, {})"}
+_OPERATORS |= {ast.USub: "-{}", ast.UAdd: "{}"}
+_COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "=="}
+_COMPARISONS |= {ast.NotEq: "!="}
 
 
 class LanguageError(ValueError):
@@ -106,11 +102,11 @@ class _Translation:
                 lines.append(f"    u_{name} = {zero}")
         return "\n".join([*lines, *inner])
 
-    def _refuse(self, node: ast.AST, why: str = "is not allowed") -> LanguageError:
+    def _refuse(self, node: ast.AST, why: str = "is not allowed") -> NoReturn:
         line = getattr(node, "lineno", 1) - self._first_line + 1
         text = " ".join(ast.unparse(node).split())
         text = text if len(text) <= 60 else text[:57] + "..."
-        return LanguageError(f"line {line} of it, `{text}`, {why}")
+        raise LanguageError(f"line {line} of it, `{text}`, {why}")
 
     def _statement(self, node: ast.stmt, indent: str) -> Iterator[str]:
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
@@ -128,18 +124,21 @@ class _Translation:
                 for statement in node.orelse:
                     yield from self._statement(statement, indent + "    ")
         elif isinstance(node, ast.For) and not node.orelse:
-            yield from self._loop(node, indent)
+            yield f"{indent}{self._enter(node.iter, node.target)}:"
+            for statement in node.body:
+                yield from self._statement(statement, indent + "    ")
+            self._loops.pop()
         elif isinstance(node, ast.Pass):
             yield f"{indent}pass"
         else:
-            raise self._refuse(node)
+            self._refuse(node)
 
     def _target(self, node: ast.expr) -> str:
         if not isinstance(node, ast.Name):
-            raise self._refuse(node, "is not allowed; assign to one name at a time")
+            self._refuse(node, "is not allowed; assign to one name at a time")
         is_input = self._arguments.get(node.id) or {node.id} & self._vectors & {*self._arguments}
         if node.id in self._loop_variables or is_input:
-            raise self._refuse(node, "cannot be assigned; choose another name")
+            self._refuse(node, "cannot be assigned; choose another name")
         return f"u_{node.id}"
 
     def _assigned(self, node: ast.Assign) -> str:
@@ -148,26 +147,18 @@ class _Translation:
             return self._cast(node.value)
         vector, length = self._vector(node.value)
         if self._lengths.setdefault(name, length) != length:
-            raise self._refuse(node, f"must have {self._lengths[name]} entries, as before")
+            self._refuse(node, f"must have {self._lengths[name]} entries, as before")
         return vector
-
-    def _loop(self, node: ast.For, indent: str) -> Iterator[str]:
-        yield f"{indent}{self._enter(node.iter, node.target)}:"
-        for statement in node.body:
-            yield from self._statement(statement, indent + "    ")
-        self._loops.pop()
 
     def _enter(self, over: ast.expr, variable: ast.expr) -> str:
         """Return the head of a loop, which is then the innermost one of the present loops."""
         is_range = isinstance(over, ast.Call) and ast.unparse(over.func) == "range"
         if not is_range or not isinstance(variable, ast.Name) or variable.id in self._lengths:
-            raise self._refuse(
-                over, "is not allowed; a loop must be over a range of literal numbers"
-            )
+            self._refuse(over, "is not allowed; a loop must be over a range of literal numbers")
         try:
             repeats = range(*(ast.literal_eval(bound) for bound in over.args))  # type: ignore[attr-defined]
         except (TypeError, ValueError):
-            raise self._refuse(over, "must have literal whole numbers") from None
+            self._refuse(over, "must have literal whole numbers")
         self._loops.append((variable.id, len(repeats)))
         self._check_repeats(over)
         return f"for u_{variable.id} in ti.static({ast.unparse(over)})"
@@ -175,7 +166,7 @@ class _Translation:
     def _check_repeats(self, node: ast.expr, n: int = 1) -> None:
         total = math.prod((max(1, repeats) for _, repeats in self._loops), start=n)
         if total > _MOST_REPEATS:
-            raise self._refuse(node, f"repeats {total} times; at most {_MOST_REPEATS} are allowed")
+            self._refuse(node, f"repeats {total} times; at most {_MOST_REPEATS} are allowed")
 
     def _vector(self, node: ast.expr) -> tuple[str, int]:
         """Return an expression of a vector, f64, and its length."""
@@ -191,7 +182,7 @@ class _Translation:
                 head = self._enter(generator.iter, generator.target)
                 source, length = f"ti.Vector([{self._cast(node.elt)} {head}])", self._loops.pop()[1]
         if not length:
-            raise self._refuse(node, "is not a vector, for example `[0.2 * k for k in range(3)]`")
+            self._refuse(node, "is not a vector, for example `[0.2 * k for k in range(3)]`")
         self._check_repeats(node, length)
         return source, length
 
@@ -205,15 +196,17 @@ class _Translation:
         if isinstance(node, ast.Name):
             return self._name(node)
         if isinstance(node, ast.Attribute):
-            return self._literal(node, self._attribute(node))
+            name, *attributes = ast.unparse(node).split(".")
+            outside = self._outside.get(name)
+            value = reduce(lambda of, attribute: getattr(of, attribute, None), attributes, outside)
+            return self._literal(node, value)
         if isinstance(node, ast.Subscript):
             return self._entry(node)
-        if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
-            form = _OPERATORS[type(node.op)]
+        form = _OPERATORS.get(type(getattr(node, "op", None)), "")
+        if isinstance(node, ast.BinOp) and form:
             return f"({form.format(self._number(node.left), self._number(node.right))})"
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
-            sign = "-" if isinstance(node.op, ast.USub) else ""
-            return f"({sign}{self._number(node.operand)})"
+        if isinstance(node, ast.UnaryOp) and form:
+            return f"({form.format(self._number(node.operand))})"
         if isinstance(node, ast.Compare):
             return f"ti.cast({self._truth(node)}, ti.f64)"
         if isinstance(node, ast.IfExp):
@@ -222,16 +215,16 @@ class _Translation:
         if isinstance(node, ast.Call):
             return self._call(node)
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
-            raise self._refuse(node, "is not allowed; write power(x, y), of taichi_ants.rules")
+            self._refuse(node, "is not allowed; write power(x, y), of taichi_ants.rules")
         if isinstance(node, ast.BoolOp) or isinstance(getattr(node, "op", None), ast.Not):
-            raise self._refuse(
+            self._refuse(
                 node, "is not a number; use it as a condition, as in `1 if a and b else 0`"
             )
-        raise self._refuse(node)
+        self._refuse(node)
 
     def _literal(self, node: ast.expr, value: Any) -> str:
         if not isinstance(value, (bool, int, float)):
-            raise self._refuse(node, "is not a number")
+            self._refuse(node, "is not a number")
         return f"ti.f64({float(value)!r})"
 
     def _name(self, node: ast.Name) -> str:
@@ -240,50 +233,42 @@ class _Translation:
         if node.id in self._numbers and node.id not in self._loop_variables:
             return f"u_{node.id}"
         if node.id in self._lengths:
-            raise self._refuse(node, "is a vector; use its entries, for example with [0]")
+            self._refuse(node, "is a vector; use its entries, for example with [0]")
         if node.id in self._loop_variables:
-            raise self._refuse(node, "is used outside its loop")
+            self._refuse(node, "is used outside its loop")
         if node.id not in self._outside:
-            raise self._refuse(node, "is not defined")
+            self._refuse(node, "is not defined")
         return self._literal(node, self._outside[node.id])
-
-    def _attribute(self, node: ast.Attribute) -> Any:
-        inner = node.value
-        if isinstance(inner, ast.Attribute):
-            return getattr(self._attribute(inner), node.attr, None)
-        name = inner.id if isinstance(inner, ast.Name) else ""
-        return getattr(self._outside.get(name), node.attr, None)
 
     def _entry(self, node: ast.Subscript) -> str:
         name = node.value.id if isinstance(node.value, ast.Name) else ""
         length, index = self._lengths.get(name, 0), node.slice
         if not length:
-            raise self._refuse(node, "is not an entry of a vector")
+            self._refuse(node, "is not an entry of a vector")
         if isinstance(index, ast.Constant):
             if type(index.value) is not int or not 0 <= index.value < length:
-                raise self._refuse(node, f"must have an index from 0 to {length - 1}")
+                self._refuse(node, f"must have an index from 0 to {length - 1}")
             return f"u_{name}[{index.value}]"
         if isinstance(index, ast.Name) and any(index.id == variable for variable, _ in self._loops):
             return f"u_{name}[u_{index.id}]"
         if name in self._vectors:
-            raise self._refuse(node, "must have a literal number or the name of a loop as index")
+            self._refuse(node, "must have a literal number or the name of a loop as index")
         number = f"ti.cast({self._number(index)}, ti.i32)"
         return f"u_{name}[ti.max(ti.min({number}, {length - 1}), 0)]"
 
     def _call(self, node: ast.Call) -> str:
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name not in FUNCTIONS or name in self._numbers:
-            raise self._refuse(node, f"calls another function than {', '.join(FUNCTIONS)}")
+            self._refuse(node, f"calls another function than {', '.join(FUNCTIONS)}")
         wanted, of_vector = FUNCTIONS[name], name == "pick"
         arguments = [self._vector(argument)[0] for argument in node.args[:of_vector]]
         arguments += [self._number(argument) for argument in node.args[of_vector:]]
         is_folded = name in ("min", "max") and len(arguments) >= wanted
         if node.keywords or not (len(arguments) == wanted or is_folded):
-            raise self._refuse(node, f"must have {wanted} arguments")
-        result = arguments[0] if is_folded else f"{name}_({', '.join(arguments)})"
-        for argument in arguments[1:] if is_folded else ():
-            result = f"{name}_({result}, {argument})"
-        return result
+            self._refuse(node, f"must have {wanted} arguments")
+        if is_folded:
+            return reduce(lambda result, argument: f"{name}_({result}, {argument})", arguments)
+        return f"{name}_({', '.join(arguments)})"
 
     def _truth(self, node: ast.expr) -> str:
         """Return an expression of a truth value."""
@@ -297,7 +282,7 @@ class _Translation:
         parts, left = [], self._number(node.left)
         for operator, right in zip(node.ops, node.comparators, strict=True):
             if type(operator) not in _COMPARISONS:
-                raise self._refuse(node)
+                self._refuse(node)
             following = self._number(right)
             parts.append(f"({left} {_COMPARISONS[type(operator)]} {following})")
             left = following

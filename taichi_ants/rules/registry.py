@@ -1,24 +1,23 @@
-"""The registry of rules that you write."""
+"""The registry of rules that you write, and how a function becomes a rule."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any
+from dataclasses import field, make_dataclass, replace
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from taichi_ants.errors import AntsError, check_one_of, expect, shown
-from taichi_ants.rules.inputs import KINDS
-from taichi_ants.rules.rule import BUILT_IN, RULES, Rule, rule_of, try_in_python
+from taichi_ants.errors import AntsError, check_one_of, shown, unusable
+from taichi_ants.rules.inputs import KINDS, Input, input_of
+from taichi_ants.rules.language import LanguageError, kernel_source
+from taichi_ants.rules.rule import BUILT_IN, RULES, Parameters, Rule, try_in_python
+from taichi_ants.settings import Setting
 
 get = RULES.get
 
 
 def register(
-    kind: str,
-    *,
-    name: str | None = None,
-    reference: Callable[..., Any] | None = None,
-    summary: str = "",
+    kind: str, *, name: str | None = None, summary: str = ""
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Return a decorator that registers a function as a rule and returns the function.
 
@@ -27,7 +26,6 @@ def register(
     Args:
         kind: "choice", "deposit", "evaporation" or "reward".
         name: The name of the rule, by default that of the function.
-        reference: Another function of the same arguments, which the reference calls instead.
         summary: A short description.
 
     Raises:
@@ -35,7 +33,6 @@ def register(
             compute, or a result for drawn inputs is outside the range of the kind.
     """
     check_one_of("the kind of the rule", kind, tuple(KINDS))
-    expect("summary", summary, str)
 
     def add(function: Callable[..., Any]) -> Callable[..., Any]:
         if not inspect.isfunction(function) or function.__name__ == "<lambda>":
@@ -49,12 +46,51 @@ def register(
                 f"{called!r} is the name of a rule of the kind {RULES.yours[called].kind!r}; "
                 "choose another name."
             )
-        rule = rule_of(called, kind, function, reference, summary)
+        inputs, settings = _arguments(called, kind, function)
+        lengths = {
+            argument: inputs[argument].length if argument in inputs else 0
+            for argument in inspect.signature(function).parameters
+        }
+        rule = Rule(called, kind, function, inputs, settings, "", summary)
+        try:
+            rule = replace(rule, source=kernel_source(function, lengths))
+        except LanguageError as error:
+            raise unusable(rule, error) from None
         try_in_python(rule)
         RULES.add(called, rule)
         return function
 
     return add
+
+
+def _arguments(
+    name: str, kind: str, function: Callable[..., Any]
+) -> tuple[dict[str, Input], type[Parameters]]:
+    """Return the inputs of a function, and the class of its parameters, which have defaults."""
+    inputs, parameters = {}, []
+    hints = get_type_hints(function, include_extras=True)
+    for argument in inspect.signature(function).parameters.values():
+        hint = hints.get(argument.name, type(argument.default))
+        hint = hint if get_origin(hint) is Annotated else Annotated[hint, Setting("parameter")]
+        has_default = argument.default is not argument.empty
+        is_plain = argument.kind is argument.POSITIONAL_OR_KEYWORD
+        if is_plain and not has_default and (read := input_of(kind, argument.name)):
+            inputs[argument.name] = read
+        elif is_plain and has_default and get_args(hint)[0] in (int, float):
+            parameters.append((argument.name, hint, field(default=argument.default)))
+        else:
+            more = "".join(f", {start}FIELD" for start in KINDS[kind].of_fields)
+            raise AntsError(
+                f"the rule {name!r} has the argument `{argument}`, which is not an input of the "
+                f"kind {kind!r}; choose from {', '.join(KINDS[kind].inputs)}{more}, or give it a "
+                "default that is a whole number (int) or a number (float), which makes it a "
+                "parameter."
+            )
+    settings: Any = make_dataclass(name, parameters, bases=(Parameters,), frozen=True)
+    settings.path = f"task.rules.{name}"
+    settings.__doc__ = f"The parameters of the rule {name!r}."
+    settings()  # checks the defaults
+    return inputs, settings
 
 
 def registered(kind: str, name: str) -> Rule | None:

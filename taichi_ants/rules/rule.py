@@ -1,18 +1,16 @@
-"""Rules that you write, and their parameters: how a function becomes a rule, and its trial."""
+"""Rules that you write, their parameters, and their trial on drawn inputs."""
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from dataclasses import dataclass
+from typing import Any
 
-from taichi_ants.errors import AntsError, shown, unusable
+from taichi_ants.errors import shown, unusable
 from taichi_ants.registry import Registry
-from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, input_of, values_shown
-from taichi_ants.rules.language import LanguageError, kernel_source
-from taichi_ants.settings import Setting, Settings, declared
+from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, values_shown
+from taichi_ants.settings import Settings, declared
 
 TRIES = 2000  # drawn sets of inputs with which `register` tries a rule
 BUILT_IN = {
@@ -49,7 +47,6 @@ class Rule:
             the field NAME in the three cells ahead, and `level_NAME` is that of the ant's own cell.
             In "deposit", `level_NAME` is that of the cell of the deposit.
             Arguments with a default are parameters, whole numbers or floats.
-        reference: The Python function that the reference calls; by default, `function` itself.
         inputs: The inputs by name, in the order of the arguments.
         settings: The class of the parameters.
         source: The source of the function for kernels.
@@ -59,7 +56,6 @@ class Rule:
     name: str
     kind: str
     function: Callable[..., Any]
-    reference: Callable[..., Any]
     inputs: Mapping[str, Input]
     settings: type[Parameters]
     source: str
@@ -81,7 +77,7 @@ class Rule:
         Actions and rewards are rounded down. A result that is not a number counts as the smallest.
         """
         numbers = {name: float(value) for name, value in parameters.items()}
-        kind, result = KINDS[self.kind], float(self.reference(**inputs, **numbers))
+        kind, result = KINDS[self.kind], float(self.function(**inputs, **numbers))
         result = min(max(result, kind.least), kind.most) if result == result else kind.least
         return math.floor(result) if kind.is_whole else result
 
@@ -95,68 +91,6 @@ RULES: Registry[Rule] = Registry(
 
 def _parameters(name: str, values: Mapping[str, Any]) -> Parameters:
     return RULES.get(name).settings(**values)
-
-
-def rule_of(
-    name: str,
-    kind: str,
-    function: Callable[..., Any],
-    reference: Callable[..., Any] | None,
-    summary: str,
-) -> Rule:
-    """Return a rule; AntsError if kernels cannot compute it, or an argument is not an input."""
-    inputs: dict[str, Input] = {}
-    arguments = inspect.signature(function).parameters
-    for argument in arguments.values():
-        if argument.kind is not argument.POSITIONAL_OR_KEYWORD:
-            raise AntsError(f"the rule {name!r} has the argument {argument}; use plain arguments.")
-        if argument.default is argument.empty:
-            read = input_of(kind, argument.name)
-            if read is None:
-                more = "".join(f", {start}FIELD" for start in KINDS[kind].of_fields)
-                raise AntsError(
-                    f"the rule {name!r} has the argument {argument.name!r}, which is not an input "
-                    f"of the kind {kind!r}; choose from {', '.join(KINDS[kind].inputs)}{more}, or "
-                    "give it a default, which makes it a parameter."
-                )
-            inputs[argument.name] = read
-    if reference is not None and list(inspect.signature(reference).parameters) != list(arguments):
-        raise AntsError(
-            f"reference of the rule {name!r} is {shown(reference)}; it must have the same "
-            "arguments in the same order."
-        )
-    settings = _settings(name, function)
-    rule = Rule(name, kind, function, reference or function, inputs, settings, "", summary)
-    lengths = {a: inputs[a].length if a in inputs else 0 for a in arguments}
-    try:
-        return replace(rule, source=kernel_source(function, lengths))
-    except LanguageError as error:
-        raise unusable(rule, error) from None
-
-
-def _settings(name: str, function: Callable[..., Any]) -> type[Parameters]:
-    """Return a class of settings for the arguments of a function with defaults."""
-    hints, parameters = get_type_hints(function, include_extras=True), {}
-    for argument in inspect.signature(function).parameters.values():
-        if argument.default is not argument.empty:
-            hint = hints.get(argument.name, type(argument.default))
-            if get_origin(hint) is not Annotated:
-                hint = Annotated[hint, Setting("parameter")]
-            if get_args(hint)[0] not in (int, float):
-                raise AntsError(
-                    f"the parameter {argument.name!r} of the rule {name!r} is "
-                    f"{argument.default!r}; declare a whole number (int) or a number (float)."
-                )
-            parameters[argument.name] = hint, argument.default
-    body = {
-        "__doc__": f"The parameters of the rule {name!r}.",
-        "__annotations__": {parameter: hint for parameter, (hint, _) in parameters.items()},
-        **{parameter: default for parameter, (_, default) in parameters.items()},
-    }
-    subclass: Any = type(name, (Parameters,), body, path=f"task.rules.{name}")
-    settings = dataclass(frozen=True)(subclass)
-    settings()  # checks the defaults
-    return settings
 
 
 def tries(rule: Rule, n: int = TRIES) -> Iterator[tuple[dict[str, Any], dict[str, float]]]:
@@ -177,27 +111,16 @@ def tries(rule: Rule, n: int = TRIES) -> Iterator[tuple[dict[str, Any], dict[str
 def try_in_python(rule: Rule) -> None:
     """Compute a rule in Python for many inputs; AntsError if it fails or leaves its range."""
     kind = KINDS[rule.kind]
-    try:
-        for inputs, parameters in tries(rule):
-            try:
-                result = rule.function(**inputs, **parameters)
-            except ArithmeticError as error:
-                shows = values_shown(inputs, parameters)
-                raise ValueError(f"{type(error).__name__}: {error}, for {shows}") from error
+    form = f"{'a whole number' if kind.is_whole else 'a number'} from {kind.least} to {kind.most}"
+    for inputs, parameters in tries(rule):
+        try:
+            result = rule.function(**inputs, **parameters)
+            said = f"it returns {shown(result)}"
             is_number = isinstance(result, (bool, int, float))
-            whole = is_number and (
-                not kind.is_whole or (math.isfinite(result) and result == math.floor(result))
-            )
-            if whole and kind.least <= result <= kind.most:
-                continue
-            shows = values_shown(inputs, parameters)
-            if not is_number:
-                raise ValueError(f"it returns {shown(result)}, which is not a number, for {shows}")
-            form = "a whole number" if kind.is_whole else "a number"
-            raise ValueError(
-                f"it returns {result} for {shows}, but must return "
-                f"{kind.result.split(':')[0]}, {form} from {kind.least} to {kind.most}"
-            )
-    except Exception as error:
-        said = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
-        raise unusable(rule, said) from error
+            if is_number and kind.least <= result <= kind.most:
+                said = said if kind.is_whole and result != math.floor(result) else ""
+        except Exception as error:
+            said = f"{type(error).__name__}: {error}"
+        if said:
+            must = f"it must return {kind.result.split(':')[0]}, {form}"
+            raise unusable(rule, f"{said} for {values_shown(inputs, parameters)}, but {must}")

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import lru_cache
-from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -22,7 +21,7 @@ from taichi_ants.features import COLONY
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import Recorder
-from taichi_ants.protocol import ProtocolEvent, When, check_queen, check_room, checked_protocol
+from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
 from taichi_ants.settings import flat
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, ROW
@@ -111,7 +110,7 @@ class RunPoint:
     def __post_init__(self) -> None:
         (config,) = arguments.checked_configs(self.training)
         object.__setattr__(self, "training", config)
-        arguments.checked_lone_task(self.task)
+        arguments.checked_task(self.task, *arguments.ALONE)
         _check_policy(self.policy, self.episodes)
         more = "" if self.policy else "; 0 requires a policy"
         checked_whole("episodes", self.episodes, 0 if self.policy else 1, otherwise=more)
@@ -280,36 +279,20 @@ class ColonyPoint:
     def _check_protocol(self) -> None:
         """Raise an AntsError, which names the event, if it can never happen as it should."""
         for learns in (True, False) if self.episodes else (False,):
-            events = self.events(learns)
-            for check, event in product((self._check_times, self._check_event), events):
+            pool = self.pool if learns else ()
+            world = (pool or self.places_of_evaluation)[0]
+            for event in self.events(learns):
                 number = [one for one in self.protocol if one.path == event.path].index(event) + 1
                 try:
-                    check(event, learns)
+                    event.times(self.ticks)
+                    for intervention in event.interventions:
+                        intervention.check_in(world, self.task, learns)
+                    if isinstance(event, When):
+                        measures.check_part(event.measure, world, self.task, single=True)
                 except AntsError as error:
                     raise AntsError(
                         f"in [[{event.path}]] number {number}, in the {DURING[learns]}, {error}"
                     ) from error
-
-    def _check_times(self, event: ProtocolEvent, learns: bool) -> None:
-        event.times(self.ticks)
-
-    def _check_event(self, event: ProtocolEvent, learns: bool) -> None:
-        places = self.pool if learns and self.pool else self.places_of_evaluation
-        of, start = self.events(learns), (self.ants, self.capacity, self.start, False)
-        capacity = arguments.checked_capacity(self.task, *start)
-        check_room(event, of, self.task, self.ants, capacity, self.ticks)
-        for one in event.interventions:
-            one.check_in(places[0], self.task, learns)
-        if isinstance(event, When):
-            measures.check_part(event.measure, places[0], self.task, single=True)
-        for world in () if places is self.pool else places:  # a pool's worlds are drawn
-            check_queen(event, of, world, self.ticks)
-
-    def check_worlds(self, several: Iterable[World]) -> None:
-        """Raise AntsError if an event of the evaluation is impossible in one of its worlds."""
-        events = self.events(learns=False)
-        for event, world in product(events, several if events else ()):
-            check_queen(event, events, world, self.ticks)
 
     @property
     def places_of_evaluation(self) -> tuple[World, ...]:

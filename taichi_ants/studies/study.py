@@ -73,9 +73,6 @@ class Study:
             for one, seed in starts:
                 who = ("a colony", COLONY) if of_colony else ("a run of one ant", LONE)
                 arguments.checked_world(one, True, *who).start(seed, ants)
-        for point in self.points:
-            if isinstance(point.world, Drawn):
-                point.check_worlds(map(point.world.of, self.seeds))
 
     @cached_property
     def keys(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.analysis import designs, sensitivity, style, sweeps
+from taichi_ants.analysis import sensitivity, sweeps
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.statistics import known_means
 from taichi_ants.errors import AntsError, shown
@@ -197,8 +197,7 @@ class Sweep:
             ]
             files.write_csv(folder / SENSITIVITY, of_all, fields)
         if results.figures:
-            with style.all_or_none(folder / FIGURES):
-                self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
+            self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
         return report
 
     def _report_on_first(self, values: dict[str, np.ndarray]) -> str:
@@ -232,7 +231,7 @@ class Sweep:
             else:
                 names = list(design.varying(axes))
                 logs = {n for n, axis in axes.items() if isinstance(axis, Range) and axis.log}
-                designs.draw(path, self.settings[some], names, logs, values[some], words)
+                sweeps.draw_design(path, self.settings[some], names, logs, values[some], words)
         if indices:
             path = folder / f"sensitivity_{first}.png"
             sensitivity.draw(path, indices, words, values.shape[1])

@@ -308,7 +308,8 @@ def _point(
     `reading` are the arguments of the point that are not settings.
     """
     learner = settings.get("training.learner")
-    known = _known(kind, learners.get(str(learner)).hyperparameters if learner else None)
+    of_learner: Any = learners.get(str(learner)).hyperparameters if learner else None
+    known = _known(kind, of_learner)
     settings, events = _without_events(settings)
     for name in settings:
         # The world checks its settings, and named groups check theirs.

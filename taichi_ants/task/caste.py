@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
 from typing import Annotated, Any, Literal, get_args
 
 from taichi_ants.errors import AntsError, is_flag
 from taichi_ants.settings import Setting, Settings
-from taichi_ants.task.constants import MAX_CASTES, MAX_NESTS, MAX_STEPS
+from taichi_ants.task.choice import Attraction, Exponent, Temperature
+from taichi_ants.task.constants import MAX_CASTES, MAX_NESTS
+from taichi_ants.task.food import Ticks
+from taichi_ants.task.labour import Stimulus
 
 Distribution = Literal["none", "fixed", "uniform", "normal", "lognormal"]
 DISTRIBUTIONS: tuple[str, ...] = get_args(Distribution)
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
+Rate = Annotated[float | None, Setting(least=0, most=1)]
+Number = Annotated[int | None, Setting(least=0)]
 
 
 @dataclass(frozen=True)
@@ -34,28 +39,32 @@ class Threshold(Settings, path="task.castes.NAME.threshold"):
         ),
     ] = "none"
     value: Annotated[
-        float | None,
+        Stimulus,
         Setting("threshold, or the middle of its distribution", unit="units of stimulus"),
-        Setting(least=0, most=1e6, usual=10.0, only=("distribution", *DISTRIBUTIONS[1:])),
+        Setting(usual=10.0, only=("distribution", *DISTRIBUTIONS[1:])),
     ] = None
     spread: Annotated[
-        float | None,
-        Setting("width of the distribution: half the range, or a standard deviation"),
-        Setting(least=0, most=1e6, usual=1.0, only=("distribution", *DISTRIBUTIONS[2:])),
+        Stimulus,
+        Setting("width of the distribution: half the range, or a standard deviation", usual=1.0),
+        Setting(only=("distribution", *DISTRIBUTIONS[2:])),
     ] = None
 
-    def __post_init__(self) -> None:
-        self.check()
-        if self.distribution == "uniform" and self.spread > self.value:  # type: ignore[operator]
-            raise AntsError(
-                f"`{self.path}.spread` is {self.spread}; it must be at most the value, "
-                f"{self.value}, because thresholds cannot be negative."
+    def faults(self) -> Iterator[str]:
+        """Yield messages about combinations of values that are not allowed."""
+        value, spread = self.value or 0.0, self.spread or 0.0
+        if self.distribution == "uniform" and spread > value:
+            yield (
+                f"`{self.path}.spread` is {spread}; it must be at most the value, {value}, because "
+                "thresholds cannot be negative."
             )
-        if self.distribution == "lognormal" and self.spread > 20:  # type: ignore[operator]
-            raise AntsError(
-                f"`{self.path}.spread` is {self.spread}; it must be between 0 and 20 for "
-                "'lognormal'."
-            )
+        if self.distribution == "lognormal" and spread > 20:
+            yield f"`{self.path}.spread` is {spread}; it must be between 0 and 20 for 'lognormal'."
+
+    @classmethod
+    def converted(cls, value: Any) -> Any:
+        """Return the threshold that a number or the name of a distribution stands for."""
+        is_number = isinstance(value, Real) and not is_flag(value)
+        return cls("fixed", value) if is_number else super().converted(value)
 
     @classmethod
     def named(cls) -> Mapping[str, Threshold]:
@@ -80,25 +89,22 @@ class Caste(Settings, path="task.castes.NAME"):
     Ants of a caste share a table of action values, and can have their own numbers. None means that
     they have those of the task, or of the training. A caste has a `share` of the ants of each nest,
     or a number of `ants`; castes without both divide the remaining share equally. With a `policy`,
-    the ants of the caste follow it and do not learn. `lays` can also be a list of names, and
-    `threshold` a number, which is a fixed threshold.
+    the ants of the caste follow it and do not learn. `threshold` can also be a number, which is a
+    fixed threshold.
     """
 
     most_entries = MAX_CASTES
 
     share: Annotated[
-        float | None, Setting("share of the ants of a nest that `ants` does not give to castes"),
-        Setting(least=0, most=1),
-    ] = None  # fmt: skip
+        Rate, Setting("share of the ants of a nest that `ants` does not give to castes")
+    ] = None
     ants: Annotated[
-        int | None, Setting("number of ants in each nest at the start, instead of a share"),
-        Setting(least=0, most=1 << 24),
-    ] = None  # fmt: skip
+        Number,
+        Setting("number of ants in each nest at the start, instead of a share", most=1 << 24),
+    ] = None
     nest: Annotated[
-        int | None,
-        Setting(
-            "number of the nest that has the caste; off: each nest", least=0, most=MAX_NESTS - 1
-        ),
+        Number,
+        Setting("number of the nest that has the caste; off: each nest", most=MAX_NESTS - 1),
     ] = None
     policy: Annotated[
         str | None,
@@ -106,28 +112,19 @@ class Caste(Settings, path="task.castes.NAME"):
             "policy file, or the name of a hand-written policy, that the ants follow; off: learn"
         ),
     ] = None
-    epsilon: Annotated[float | None, Setting("constant exploration rate", least=0, most=1)] = None
+    epsilon: Annotated[Rate, Setting("constant exploration rate")] = None
     epsilon_spread: Annotated[
-        float | None,
-        Setting("half the range of the exploration rates of the ants around `epsilon`"),
-        Setting(least=0, most=0.5),
+        Rate,
+        Setting("half the range of the exploration rates of the ants around `epsilon`", most=0.5),
     ] = None
-    learning_rate: Annotated[
-        float | None, Setting("constant learning rate", least=1e-37, most=1)
-    ] = None  # fmt: skip
-    discount: Annotated[float | None, Setting("discount factor", least=0, most=1)] = None
-    temperature: Annotated[
-        float | None, Setting("temperature of the rule softmax", least=1e-6, most=1e6)
-    ] = None
+    learning_rate: Annotated[Rate, Setting("constant learning rate", least=1e-37)] = None
+    discount: Annotated[Rate, Setting("discount factor")] = None
+    temperature: Annotated[Temperature, Setting("temperature of the rule softmax")] = None
     k: Annotated[
-        float | None,
-        Setting(
-            "attraction of a cell without a trail, for the rule deneubourg", least=0.001, most=1e6
-        ),
+        Attraction, Setting("attraction of a cell without a trail, for the rule deneubourg")
     ] = None
     exponent: Annotated[
-        float | None,
-        Setting("exponent of the attraction of a cell, for the rule deneubourg", least=0, most=20),
+        Exponent, Setting("exponent of the attraction of a cell, for the rule deneubourg")
     ] = None
     lays: Annotated[
         str, Setting("pheromones that the ants lay: all, none, or names separated by commas")
@@ -138,46 +135,23 @@ class Caste(Settings, path="task.castes.NAME"):
     homing_cue: Annotated[
         str | None, Setting("what ants with food see as S; off: the cue of the task")
     ] = None
-    lifespan: Annotated[
-        int | None, Setting("age at which an ant dies; off: that of the task", unit="ticks"),
-        Setting(least=1, most=MAX_STEPS),
-    ] = None  # fmt: skip
+    lifespan: Annotated[Ticks, Setting("age at which an ant dies; off: that of the task")] = None
     threshold: Annotated[Threshold, Setting("response thresholds of the ants")] = field(
         default_factory=Threshold
     )
 
-    def __post_init__(self) -> None:
-        lays: Any = self.lays
-        if isinstance(lays, (list, tuple)) and all(isinstance(name, str) for name in lays):
-            object.__setattr__(self, "lays", ",".join(lays) or NOTHING)
-        value: Any = self.threshold
-        if isinstance(value, Real) and not is_flag(value):
-            object.__setattr__(self, "threshold", Threshold("fixed", value))  # type: ignore[arg-type]
-        self.check()
+    def faults(self) -> Iterator[str]:
+        """Yield messages about combinations of values that are not allowed."""
+        path, spread, epsilon = self.path, self.epsilon_spread, self.epsilon
         if self.share is not None and self.ants is not None:
-            raise AntsError(
-                f"`{self.path}.ants` is {self.ants}, but `share` is {self.share}; give one of them."
+            yield f"`{path}.ants` is {self.ants}, but `share` is {self.share}; give one of them."
+        if spread is not None and epsilon is None:
+            yield f"`{path}.epsilon_spread` is {spread}, but `epsilon` is off; set it, too."
+        if spread is not None and epsilon is not None and spread > min(epsilon, 1 - epsilon):
+            yield (
+                f"`{path}.epsilon_spread` is {spread}; with `epsilon` {epsilon} it must be at most "
+                f"{min(epsilon, 1 - epsilon):g}, because rates lie between 0 and 1."
             )
-        if self.epsilon_spread is not None:
-            self._check_spread(self.epsilon_spread)
-
-    def _check_spread(self, spread: float) -> None:
-        if self.epsilon is None:
-            raise AntsError(
-                f"`{self.path}.epsilon_spread` is {spread}, but `epsilon` is off; set it, too."
-            )
-        if spread > min(self.epsilon, 1 - self.epsilon):
-            raise AntsError(
-                f"`{self.path}.epsilon_spread` is {spread}; with `epsilon` {self.epsilon} it must "
-                f"be at most {min(self.epsilon, 1 - self.epsilon):g}, because rates lie between 0 "
-                "and 1."
-            )
-
-    def __repr__(self) -> str:
-        """Return the settings that differ from their defaults."""
-        defaults, values = vars(Caste()), vars(self)
-        changed = [f"{name}={values[name]!r}" for name in values if values[name] != defaults[name]]
-        return f"Caste({', '.join(changed)})"
 
     @property
     def fixed(self) -> tuple[Any, ...]:
@@ -215,14 +189,14 @@ def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
             "up to 1, or to less if another caste has neither `share` nor `ants`."
         )
     equal = max(left, 0.0) / n_open if n_open else 0.0
-    return [
-        0.0
-        if not caste.is_in(nest) or caste.ants is not None
-        else equal
-        if caste.share is None
-        else caste.share
-        for caste in castes.values()
-    ]
+    usual = [equal if caste.share is None else caste.share for caste in castes.values()]
+    given = [caste.is_in(nest) and caste.ants is None for caste in castes.values()]
+    return [share if has_share else 0.0 for share, has_share in zip(usual, given, strict=True)]
+
+
+def _fixed_in(castes: Mapping[str, Caste], nest: int) -> list[int]:
+    """Return the number `ants` of each caste in a nest, 0 without one."""
+    return [(caste.ants or 0) * caste.is_in(nest) for caste in castes.values()]
 
 
 def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
@@ -234,8 +208,7 @@ def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
 
     AntsError if there are too few ants, or ants without a caste.
     """
-    shares = shares_in(castes, nest)
-    counts = [(caste.ants or 0) if caste.is_in(nest) else 0 for caste in castes.values()]
+    shares, counts = shares_in(castes, nest), _fixed_in(castes, nest)
     rest = n - sum(counts)
     if rest < 0 or (rest > 0 and not any(shares)):
         raise AntsError(
@@ -255,7 +228,6 @@ def chances_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[float]:
 
     That is the caste's share, or its `ants` divided by n.
     """
-    shares, most = shares_in(castes, nest), max(n, 1)
-    fixed = [(caste.ants or 0) if caste.is_in(nest) else 0 for caste in castes.values()]
+    shares, fixed, most = shares_in(castes, nest), _fixed_in(castes, nest), max(n, 1)
     rest = (n - sum(fixed)) / most if n else 1.0
     return [ants / most + share * rest for ants, share in zip(fixed, shares, strict=True)]

@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     import numpy as np
 
 
+Temperature = Annotated[float | None, Setting(least=1e-6, most=1e6)]
+Attraction = Annotated[float | None, Setting(least=0.001, most=1e6)]
+Exponent = Annotated[float | None, Setting(least=0, most=20)]
+
+
 @dataclass(frozen=True)
 class Choice(Settings, path="task.choice"):
     """The rule by which ants choose actions.
@@ -34,19 +39,19 @@ class Choice(Settings, path="task.choice"):
         str, Setting("rule by which ants choose actions", choices=partial(words, "choice"))
     ] = "greedy"
     temperature: Annotated[
-        float | None,
+        Temperature,
         Setting("difference of action values that makes an action e times as likely"),
-        Setting(least=1e-6, most=1e6, usual=1.0, only=("rule", "softmax")),
+        Setting(usual=1.0, only=("rule", "softmax")),
     ] = None
     k: Annotated[
-        float | None,
+        Attraction,
         Setting("attraction of a cell without a trail", unit="units of trail level"),
-        Setting(least=0.001, most=1e6, usual=20.0, only=("rule", "deneubourg")),
+        Setting(usual=20.0, only=("rule", "deneubourg")),
     ] = None
     exponent: Annotated[
-        float | None,
+        Exponent,
         Setting("exponent of the attraction of a cell; larger values follow stronger trails more"),
-        Setting(least=0, most=20, usual=2.0, only=("rule", "deneubourg")),
+        Setting(usual=2.0, only=("rule", "deneubourg")),
     ] = None
     carriers_follow: Annotated[
         str | None,

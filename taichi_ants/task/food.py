@@ -10,6 +10,7 @@ from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_STEPS
 from taichi_ants.task.rewards import Reward
 
 MAX_LOADS = 1_000_000
+Ticks = Annotated[int | None, Setting(unit="ticks", least=1, most=MAX_STEPS)]
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,5 @@ class Food(Settings, path="task.foods.NAME"):
     deliver: Annotated[Reward, Setting("reward for giving this food to the queen")] = 10
     loads: Annotated[int, Setting("loads in a cell", least=1, most=MAX_LOADS)] = 1
     regrowth: Annotated[
-        int | None,
-        Setting("time until an empty cell has all its loads again", unit="ticks"),
-        Setting(least=0, most=MAX_STEPS),
+        Ticks, Setting("time until an empty cell has all its loads again", least=0)
     ] = None

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 from taichi_ants.settings import Setting, Settings
+from taichi_ants.task.choice import Exponent
 
 LabourRule = Literal["none", "thresholds"]
+Stimulus = Annotated[float | None, Setting(least=0, most=1e6)]
+_DIVIDES = Setting(only=("rule", "thresholds"))
 
 
 @dataclass(frozen=True)
@@ -24,19 +27,19 @@ class Labour(Settings, path="task.labour"):
 
     rule: Annotated[LabourRule, Setting("rule by which ants start and stop foraging")] = "none"
     demand: Annotated[
-        float | None,
-        Setting("rise of the stimulus of each nest", unit="units of stimulus per tick"),
-        Setting(least=0, most=1e6, usual=1.0, only=("rule", "thresholds")),
+        Stimulus,
+        Setting("rise of the stimulus of each nest", unit="units of stimulus per tick", usual=1.0),
+        _DIVIDES,
     ] = None
     relief: Annotated[
-        float | None,
-        Setting("fall of the stimulus with each delivery", unit="units of stimulus"),
-        Setting(least=0, most=1e6, usual=10.0, only=("rule", "thresholds")),
+        Stimulus,
+        Setting("fall of the stimulus with each delivery", unit="units of stimulus", usual=10.0),
+        _DIVIDES,
     ] = None
     exponent: Annotated[
-        float | None,
+        Exponent,
         Setting("exponent of the response to the stimulus; larger values make it steeper"),
-        Setting(least=0, most=20, usual=2.0, only=("rule", "thresholds")),
+        Setting(usual=2.0, only=("rule", "thresholds")),
     ] = None
     stop_probability: Annotated[
         float | None,

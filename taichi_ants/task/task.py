@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 from functools import cache, partial
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import shown
 from taichi_ants.rules.inputs import LABOUR
 from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import Parameters, Rule
@@ -17,9 +17,8 @@ from taichi_ants.settings import Named, Setting, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
 from taichi_ants.task.choice import Choice, Noise
-from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.task.field import COMPASS, TRAIL, Field
-from taichi_ants.task.food import Food
+from taichi_ants.task.food import Food, Ticks
 from taichi_ants.task.labour import Labour
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
@@ -28,7 +27,6 @@ from taichi_ants.task.rewards import Rewards
 Delivery = Literal["terminates", "truncates"]
 DELIVERIES: tuple[str, ...] = get_args(Delivery)
 _CUES = {"outbound_cue": (), "homing_cue": (COMPASS,)}  # with cues that are not pheromones
-Ticks = Annotated[int | None, Setting(unit="ticks", least=1, most=MAX_STEPS)]
 
 
 @dataclass(frozen=True)
@@ -61,10 +59,10 @@ class Traffic(Settings, path="task.traffic"):
         ),
     ] = False
 
-    def __post_init__(self) -> None:
-        self.check()
+    def faults(self) -> Iterator[str]:
+        """Yield messages about combinations of values that are not allowed."""
         if self.carriers_first and not self.shared:
-            raise AntsError(
+            yield (
                 "`task.traffic.carriers_first` is True; leave it out unless `swap` or `follow` is "
                 "True."
             )
@@ -185,25 +183,101 @@ class Task(Settings, path="task"):
         Named[Parameters], Setting("parameters of the rules that you wrote, by name")
     ] = field(default_factory=Named)
 
-    def __post_init__(self) -> None:
-        self.check()
-        self._check_choice()
-        self._check_fields()
-        self._check_foods()
-        self._check_castes()
-        self._check_rules()
+    def check(self) -> None:
+        """Check each value, and complete the parameters of your rules."""
+        super().check()
+        used = {rule.name: self.rules.get(rule.name) or rule.settings() for rule in self.own_rules}
+        others = {name: self.rules[name] for name in self.rules if name not in used}
+        object.__setattr__(self, "rules", Named({**used, **others}))
 
-    def _check_foods(self) -> None:
-        if self.foods and self.life.regrowth is not None:
-            raise AntsError(
-                f"`task.life.regrowth` is {self.life.regrowth}; with `task.foods`, set the "
-                "regrowth of each kind instead."
+    def faults(self) -> Iterator[str]:
+        """Yield messages about combinations of values that are not allowed."""
+        choice, life, labour = self.choice, self.life, self.labour
+        without_states = choice.rule == "deneubourg" or (choice.own_rule and self.noise.misread)
+        if without_states and self.observation != "paper":
+            yield (
+                f"`task.observation` is {self.observation!r}; it must be 'paper' if "
+                f"`task.choice.rule` is {choice.rule!r} and `task.noise.misread` "
+                f"{self.noise.misread}."
             )
-        if self.life.pile_move_interval and (len(self.foods) > 1 or self.has_loads):
-            raise AntsError(
-                f"`task.life.pile_move_interval` is {self.life.pile_move_interval}; only "
-                "food of one kind with one load in a cell can wander, so leave it out."
+        if choice.carriers_follow is not None and self.homing_cue != COMPASS:
+            yield (
+                f"`task.choice.carriers_follow` is {choice.carriers_follow!r}, but "
+                f"`task.homing_cue` is {self.homing_cue!r}, which ants with food follow already; "
+                "leave one of them out."
             )
+        for name in (TRAIL, COMPASS, ALL, NOTHING):  # the last two have a meaning in `lays`
+            if name in self.fields:
+                yield (
+                    f"`task.fields` has a field {name!r}, but that name is taken; choose another "
+                    "name."
+                )
+        for what, field_name, *more in self._names_of_fields():
+            known = (*more, TRAIL, *self.fields)
+            if field_name is not None and field_name not in known:
+                yield (
+                    f"{what} is {shown(field_name)}; it must be one of {', '.join(known)}, or the "
+                    "name of a field that you add to `task.fields`."
+                )
+        if self.foods and life.regrowth is not None:
+            yield (
+                f"`task.life.regrowth` is {life.regrowth}; with `task.foods`, set the regrowth of "
+                "each kind instead."
+            )
+        if life.pile_move_interval and (len(self.foods) > 1 or self.has_loads):
+            yield (
+                f"`task.life.pile_move_interval` is {life.pile_move_interval}; only food of one "
+                "kind with one load in a cell can wander, so leave it out."
+            )
+        if labour.divides and not any(caste.threshold.exists for caste in self.castes.values()):
+            yield (
+                f"`task.labour.rule` is {labour.rule!r}, but ants have no thresholds; add a caste "
+                "with a `threshold` to `task.castes`."
+            )
+        nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
+        for nest in (nests or {0}) if self.castes else ():
+            shares_in(self.castes, nest)  # raises AntsError
+        unused = self._unused_of_castes
+        for name, caste in self.castes.items():
+            if caste.threshold.exists and not labour.divides:
+                yield (
+                    f"`task.castes.{name}.threshold` is {caste.threshold.distribution!r}; leave it "
+                    "out unless `task.labour.rule` is 'thresholds'."
+                )
+            for setting in unused:
+                if getattr(caste, setting) is not None:
+                    yield (
+                        f"`task.castes.{name}.{setting}` is {shown(getattr(caste, setting))}; "
+                        f"leave it out, because `task.choice.rule` is {choice.rule!r}."
+                    )
+        rules = {rule.name: rule for rule in self.own_rules}
+        for name in self.rules:
+            if name not in rules:
+                yield (
+                    f"`task.rules` has parameters of {name!r}, a rule that the task does not use; "
+                    "leave them out, or name the rule, for example in `task.choice.rule`."
+                )
+            needs = [read for read in LABOUR if name in rules and read in rules[name].inputs]
+            if needs and not labour.divides:
+                yield (
+                    f"the rule {name!r} reads `{needs[0]}`; set `task.labour.rule` to 'thresholds'."
+                )
+
+    def _names_of_fields(self) -> Iterator[tuple[Any, ...]]:
+        """Yield each name of a pheromone in the settings, after what it is, with further words."""
+        yield "`task.choice.carriers_follow`", self.choice.carriers_follow
+        for name in self.sees.reads:
+            yield f"a field that the observation {self.observation!r} reads", name
+        for rule in self.own_rules:
+            for name in rule.fields:
+                yield f"a field that the rule {rule.name!r} reads", name
+        owners = {"task": self, **{f"task.castes.{n}": caste for n, caste in self.castes.items()}}
+        for path, owner in owners.items():
+            for cue, more in _CUES.items():
+                yield f"`{path}.{cue}`", getattr(owner, cue), *more
+            if isinstance(owner, Caste):
+                for name in owner.pheromones_laid((TRAIL, *self.fields)):
+                    yield f"a name in `{path}.lays`", name, ALL, NOTHING
 
     @property
     def own_reward(self) -> Rule | None:
@@ -213,45 +287,21 @@ class Task(Settings, path="task"):
     @property
     def own_rules(self) -> tuple[Rule, ...]:
         """Your rules that the task uses, each once."""
-        pheromones = (self.pheromone, *self.fields.values())
-        of_fields = [
-            rule
-            for pheromone in pheromones
-            for rule in (pheromone.own_deposit, pheromone.own_evaporation)
-        ]
-        of_task = (self.choice.own_rule, self.own_reward, *of_fields)
-        return tuple(dict.fromkeys(rule for rule in of_task if rule is not None))
+        pheromones = self.pheromone, *self.fields.values()
+        of_fields = [r for p in pheromones for r in (p.own_deposit, p.own_evaporation)]
+        return tuple(
+            dict.fromkeys(filter(None, (self.choice.own_rule, self.own_reward, *of_fields)))
+        )
 
-    def _check_rules(self) -> None:
-        rules = {rule.name: rule for rule in self.own_rules}
-        for name in self.rules.keys() - rules.keys():
-            raise AntsError(
-                f"`task.rules` has parameters of {name!r}, a rule that the task does not use; "
-                "leave them out, or name the rule, for example in `task.choice.rule`."
-            )
-        used = {name: self.rules.get(name) or rule.settings() for name, rule in rules.items()}
-        object.__setattr__(self, "rules", Named(used))
-        for name, rule in rules.items():
-            for read in rule.fields:
-                self._check_field(f"a field that the rule {name!r} reads", read)
-            needs = [read for read in LABOUR if read in rule.inputs]
-            if needs and not self.labour.divides:
-                raise AntsError(
-                    f"the rule {name!r} reads `{needs[0]}`; set `task.labour.rule` to 'thresholds'."
-                )
-
-    def _changed(self, changes: Mapping[str, Any]) -> Task:
-        # Rules that are no longer used lose their parameters.
-        if not self.rules and "rules" not in changes:
-            return super()._changed(changes)
+    def replace(self, /, **changes: Any) -> Task:
+        """Return the task with changes; rules that it no longer uses lose their parameters."""
         bare = copy.copy(self)
         object.__setattr__(bare, "rules", Named())
-        others = {name: value for name, value in changes.items() if name != "rules"}
-        task = super(Task, bare)._changed(others)
+        parameters = changes.pop("rules", {})
+        task = super(Task, bare).replace(**changes)
         kept = {name: self.rules.get(name, default) for name, default in task.rules.items()}
-        return super(Task, replace(task, rules=Named(kept)))._changed(
-            {"rules": changes["rules"]} if "rules" in changes else {}
-        )
+        object.__setattr__(task, "rules", Named(kept))
+        return task if parameters == {} else super(Task, task).replace(rules=parameters)
 
     @property
     def has_loads(self) -> bool:
@@ -270,26 +320,9 @@ class Task(Settings, path="task"):
         spans = [self.life.lifespan, *(caste.lifespan for caste in self.castes.values())]
         return self.life.births or any(span is not None for span in spans)
 
-    def _check_castes(self) -> None:
-        for name, caste in self.castes.items():
-            self._check_caste(f"`task.castes.{name}", caste)
-        nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
-        for nest in (nests or {0}) if self.castes else ():
-            shares_in(self.castes, nest)
-        has_threshold = any(caste.threshold.exists for caste in self.castes.values())
-        if self.labour.divides and not has_threshold:
-            raise AntsError(
-                f"`task.labour.rule` is {self.labour.rule!r}, but ants have no thresholds; add a "
-                "caste with a `threshold` to `task.castes`."
-            )
-
-    def _check_caste(self, path: str, caste: Caste) -> None:
-        """Raise an AntsError that names `path` if a caste does not fit the other settings."""
-        if caste.threshold.exists and not self.labour.divides:
-            raise AntsError(
-                f"{path}.threshold` is {caste.threshold.distribution!r}; leave it out unless "
-                "`task.labour.rule` is 'thresholds'."
-            )
+    @property
+    def _unused_of_castes(self) -> set[str]:
+        """The settings of castes that the rule of choice does not use."""
         learning = ("policy", "epsilon", "epsilon_spread", "learning_rate", "discount")
         rules = {
             "greedy": learning,
@@ -297,26 +330,8 @@ class Task(Settings, path="task"):
             "deneubourg": ("k", "exponent"),
         }
         usual = rules["greedy"] if self.choice.needs_table else ()  # for your own rules
-        for name in {name for of_rule in rules.values() for name in of_rule}:
-            value = getattr(caste, name)
-            if value is not None and name not in rules.get(self.choice.rule, usual):
-                raise AntsError(
-                    f"{path}.{name}` is {shown(value)}; leave it out, because `task.choice.rule` "
-                    f"is {self.choice.rule!r}."
-                )
-        for name in caste.pheromones_laid((TRAIL, *self.fields)):
-            self._check_field(f"a name in {path}.lays`", name, ALL, NOTHING)
-        for setting, more in _CUES.items():
-            self._check_field(f"{path}.{setting}`", getattr(caste, setting), *more)
-
-    def _check_field(self, what: str, name: str | None, *more: str) -> None:
-        """Raise AntsError unless a name is None, a pheromone's, or one of `more`."""
-        known = (*more, TRAIL, *self.fields)
-        if name is not None and name not in known:
-            raise AntsError(
-                f"{what} is {shown(name)}; it must be one of {', '.join(known)}, or the name of a "
-                "field that you add to `task.fields`."
-            )
+        used = rules.get(self.choice.rule, usual)
+        return {name for of_rule in rules.values() for name in of_rule}.difference(used)
 
     def cues_of(self, caste: Caste | None) -> tuple[int, int]:
         """Return the numbers of the outbound and the homing cue of a caste, or of the task."""
@@ -339,42 +354,6 @@ class Task(Settings, path="task"):
     def named(cls) -> Mapping[str, Task]:
         """Return the named tasks: "paper", "fetching", "foraging" and "queueing"."""
         return _named()
-
-    def _check_choice(self) -> None:
-        without_states = self.choice.rule == "deneubourg"
-        without_states |= bool(self.choice.own_rule and self.noise.misread)
-        if without_states and self.observation != "paper":
-            raise AntsError(
-                f"`task.observation` is {self.observation!r}; it must be 'paper' if "
-                f"`task.choice.rule` is {self.choice.rule!r} and `task.noise.misread` "
-                f"{self.noise.misread}."
-            )
-        followed = self.choice.carriers_follow
-        self._check_field("`task.choice.carriers_follow`", followed)
-        if followed is not None and self.homing_cue != COMPASS:
-            raise AntsError(
-                f"`task.choice.carriers_follow` is {shown(followed)}, but `task.homing_cue` is "
-                f"{shown(self.homing_cue)}, which ants with food follow already; leave one of them "
-                "out."
-            )
-
-    def _check_fields(self) -> None:
-        for name in (TRAIL, COMPASS, ALL, NOTHING):  # the last two have a meaning in `lays`
-            if name in self.fields:
-                raise AntsError(
-                    f"`task.fields` has a field {name!r}, but that name is taken; choose another "
-                    "name."
-                )
-        for setting, more in _CUES.items():
-            self._check_field(f"`task.{setting}`", getattr(self, setting), *more)
-        for name in self.sees.reads:
-            self._check_field(f"a field that the observation {self.observation!r} reads", name)
-
-    def __repr__(self) -> str:
-        """Return the settings that differ from the paper's."""
-        defaults, values = vars(Task()), vars(self)
-        changed = [f"{name}={values[name]!r}" for name in values if values[name] != defaults[name]]
-        return f"Task({', '.join(changed)})"
 
     @property
     def sees(self) -> Observation:

@@ -1,13 +1,13 @@
 """Web pages that play recordings of ants: a single file, which needs no server and no network.
 
-- `record_episode`, `record_trace` and `record_colony` make a `Recording`; a `Recorder` makes its
-  frames one at a time while your code runs the colony.
+- `record_trace` and `record_colony` make a `Recording`; a `Recorder` makes its frames one at a time
+  while your code runs the colony.
 - `page` returns the page of a recording, `save_page` writes it, `frame` shows it in a notebook.
 """
 
 from taichi_ants.viewer.frames import Recording
 from taichi_ants.viewer.page import check_page, frame, notebook, page, save_page
-from taichi_ants.viewer.recorder import Recorder, record_colony, record_episode, record_trace
+from taichi_ants.viewer.recorder import Recorder, record_colony, record_trace
 
 __all__ = [
     "Recorder",
@@ -17,7 +17,6 @@ __all__ = [
     "notebook",
     "page",
     "record_colony",
-    "record_episode",
     "record_trace",
     "save_page",
 ]

@@ -10,14 +10,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from taichi_ants import files
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import expect
 from taichi_ants.rendering.snapshots import picture
-from taichi_ants.rendering.writers import check_single, png, write
+from taichi_ants.rendering.writers import check_file, png, write
 from taichi_ants.viewer.frames import Recording
 from taichi_ants.viewer.recorder import record_colony, record_trace
 from taichi_ants.worlds.world import World
@@ -92,7 +90,7 @@ def assemble(
 
 def check_page(path: files.PathLike) -> Path:
     """Return the path of a page after checking that `save_page` can write it."""
-    return check_single(path, "a page", ".html", ".htm")
+    return check_file(path, "a page", ".html", ".htm")
 
 
 def save_page(path: files.PathLike, recording: Recording) -> None:
@@ -119,7 +117,11 @@ def notebook(media: Any) -> str | None:
     if isinstance(media, Recording):
         return frame(media)
     if isinstance(media, World):
-        return _image(media, picture(media)) if media.grid.size <= _MOST_CELLS else None
+        if media.grid.size > _MOST_CELLS:
+            return None
+        # The alternative text is for screen readers.
+        content = base64.b64encode(png(picture(media), optimize=True)).decode()
+        return f'<img alt="{html.escape(repr(media))}" src="data:image/png;base64,{content}">'
     if isinstance(media, Trace):
         small = media.arguments is not None and len(media) <= _MOST_STEPS
         return frame(record_trace(media)) if small else None
@@ -127,9 +129,3 @@ def notebook(media: Any) -> str | None:
     if media.grid.size > _MOST_CELLS or media.ants > _MOST_ANTS or media.episode < 0:
         return None
     return frame(record_colony(media))
-
-
-def _image(world: World, pixels: np.ndarray) -> str:
-    """Return an HTML image of a world, with its text for screen readers."""
-    content = base64.b64encode(png(pixels, optimize=True)).decode()
-    return f'<img alt="{html.escape(repr(world))}" src="data:image/png;base64,{content}">'

@@ -6,18 +6,17 @@ A colony of one ant replays the episode of a trace.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.arguments import check_progress
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, check_one_of, count, expect
 from taichi_ants.rendering.scene import name_parts
-from taichi_ants.rendering.snapshots import Episode, colony_of_rollout, intervals
+from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import COMPASS, TRAIL
@@ -26,7 +25,7 @@ from taichi_ants.viewer.frames import Recording, pack, types_of
 
 _MOST_NAMES = 4096  # states up to which a header names all states, seen or not
 _IDLE = 15  # the action of an idle ant in frames
-_MOST = 1000  # points of curves of each kind
+_MOST = 2000  # points of curves
 
 Point = tuple[float, ...]  # see `frames.POINT`
 
@@ -38,10 +37,8 @@ class Progress:
         self._colony, self._world, self._first = colony, world, colony.episode
         # The ticks of all episodes until the last end that was noted, and the number of that one.
         self._before, self._ended = 0, -1
-        # For points within the first episode, and at ends of episodes: the points, the interval at
-        # which points are stored, and the number of points so far.
-        self._kept: tuple[list[Point], list[Point]] = ([], [])
-        self._every, self._seen = [1, 1], [0, 0]
+        self._every, self._seen = 1, 0  # one of `_every` points is kept
+        self.points: list[Point] = []
         self._new: list[Point] = []
 
     @property
@@ -55,28 +52,24 @@ class Progress:
         colony = self._colony
         if not ended and colony.episode != self._first:
             return
-        outcome, kept = colony.outcome(), self._kept[ended]
-        delivered = colony.delivered[self._world] + outcome.deliveries[0, self._world]
-        returns = outcome.returns[0, self._world]
-        numbers = (colony.episode, self.ticks, delivered, returns, colony.epsilon, ended)
-        if self._seen[ended] % self._every[ended] == 0:
-            kept.append(tuple(map(float, numbers)))
-            self._new.append(kept[-1])
-        self._seen[ended] += 1
-        if len(kept) > _MOST:
-            del kept[1::2]
-            self._every[ended] *= 2
+        outcome, ticks = colony.outcome(), self.ticks
+        if self._seen % self._every == 0:
+            delivered = colony.delivered[self._world] + outcome.deliveries[0, self._world]
+            returns = outcome.returns[0, self._world]
+            numbers = (colony.episode, ticks, delivered, returns, colony.epsilon, ended)
+            self.points.append(tuple(map(float, numbers)))
+            self._new.append(self.points[-1])
+        self._seen += 1
+        if len(self.points) > _MOST:
+            del self.points[1::2]
+            self._every *= 2
         if ended:
-            self._before, self._ended = numbers[1], colony.episode
+            self._before, self._ended = ticks, colony.episode
 
     def take_new_points(self) -> list[Point]:
-        """Return the points of the curves that were added since the last call."""
+        """Return the points that were added since the last call."""
         new, self._new = self._new, []
         return new
-
-    def points(self) -> list[Point]:
-        """Return all stored points, those at the ends of episodes last."""
-        return [*self._kept[False], *self._kept[True]]
 
 
 class Recorder:
@@ -106,26 +99,20 @@ class Recorder:
         check_one_of("pheromone", pheromone, (TRAIL, *colony.task.fields))
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         self.pheromone = pheromone
-        start = colony.snapshot(world)
-        self.grid = start.grid
-        self._n_states = colony.task.n_states
+        self.grid, self._n_states = colony.snapshot(world).grid, colony.task.n_states
+        self._learns, owners = colony.sharing != "frozen", colony.owners
         self.types = types_of(self.grid.size, self._n_states, self._rule.dense)
-        self._learns = colony.sharing != "frozen"
-        learner = learners.get(colony.training.learner)
-        self._has_td_errors = learner.td_error is not None and not learner.plans
-        # The data of a page that has read all frames so far.
-        self._numbers = np.zeros(0, np.int32)
-        self._ground, self._kinds = (np.zeros(self.grid.size, np.uint8) for _ in range(2))
-        # The levels of the pheromone, as they are stored.
-        self._trail = np.zeros(self.grid.size, start.fields[pheromone].dtype)
-        self._queens = np.zeros(0, np.int32)
-        owners = colony.owners
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables that were sent
-        self._table = np.full((owners * self._n_states, N_ACTIONS), np.nan, np.float32)
         self._owners = np.full(owners, -1) if colony.one_a_slot else np.arange(owners)
-        self._fixed: np.ndarray | None = None
-        self._fixed = None if self._learns else self._tables()  # constant if no ant learns
         self.progress = Progress(colony, world)
+        self._forget()
+
+    def _forget(self) -> None:
+        """Begin with the data of a page that has read no frames."""
+        self._numbers, self._queens = (np.zeros(0, np.int32) for _ in range(2))
+        self._ground, self._kinds = (np.zeros(self.grid.size, np.uint8) for _ in range(2))
+        self._trail = np.zeros(self.grid.size)  # levels of the pheromone, as they are stored
+        self._table = np.full((len(self._known), N_ACTIONS), np.nan, np.float32)
 
     @property
     def _rule(self) -> Pheromone:
@@ -137,6 +124,9 @@ class Recorder:
         colony, task = self.colony, self.colony.task
         changes = task.life.births or task.life.lifespan
         ants = "Ants" if changes else count(colony.ants, "ant")
+        is_own = task.choice.own_rule or not task.sees.encode.__module__.startswith("taichi_ants.")
+        by_letters = colony.has_training and not is_own and not task.noise.misread
+        names = (TRAIL, *task.fields, COMPASS)  # the number of the compass is -1
         return {
             "format": 4,
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
@@ -157,26 +147,19 @@ class Recorder:
             "rule": task.choice.rule,
             "values": colony.has_training,  # whether ants choose by action values
             # The view of the pheromone, "" if an ant may know more or less than its letters say.
-            "seen_by": self._rule.view if self._by_letters else "",
-            "groups": [*self._groups()],  # of ants: the castes, or one of all ants
+            "seen_by": self._rule.view if by_letters else "",
+            "groups": [  # of ants: the castes, or one of all ants
+                {
+                    "cues": [names[cue] for cue in task.cues_of(caste)],
+                    "learns": self._learns and not (caste and caste.policy),
+                }
+                for caste in task.castes.values() or [None]
+            ],
             "learns": self._learns,
             "own_tables": colony.one_a_slot,
             "follow": self._follow,
             "about": self._about(),
         }
-
-    @property
-    def _by_letters(self) -> bool:
-        task = self.colony.task
-        is_own = task.choice.own_rule or not task.sees.encode.__module__.startswith("taichi_ants.")
-        return self.colony.has_training and not is_own and not task.noise.misread
-
-    def _groups(self) -> Iterator[dict[str, Any]]:
-        task = self.colony.task
-        names = (TRAIL, *task.fields, COMPASS)  # the number of the compass is -1
-        for caste in task.castes.values() or [None]:
-            learns = self._learns and not (caste and caste.policy)
-            yield {"cues": [names[cue] for cue in task.cues_of(caste)], "learns": learns}
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
         """Return the `name_parts` of the states seen so far, except those in `known`.
@@ -191,23 +174,22 @@ class Recorder:
     def _about(self) -> list[tuple[str, str]]:
         colony, config = self.colony, self.colony.training
         x, y, z = self.grid.ranges
+        task = colony.task
         lines = {
             "world": f"{self.grid.count} cells, ranges {x}, {y}, {z}",
             "ants at the start": str(colony.ants),
             "seed": str(colony.seeds[self.world]),
-            "observation": f"{colony.task.sees.name}, {self._n_states} states",
+            "observation": f"{task.sees.name}, {self._n_states} states",
+            "nests": str(colony.n_nests) if colony.n_nests > 1 else "",
+            "castes": ", ".join(task.castes),
+            "kinds of food": ", ".join(task.foods),
         }
-        if colony.n_nests > 1:
-            lines["nests"] = str(colony.n_nests)
-        for name, entries in (("castes", colony.task.castes), ("kinds of food", colony.task.foods)):
-            if entries:
-                lines[name] = ", ".join(entries)
         if colony.task.fields:
             hidden = [name for name in (TRAIL, *colony.task.fields) if name != self.pheromone]
             lines["pheromone"] = f"{self.pheromone}; hidden: {', '.join(hidden)}"
         if self._learns:
             lines["learner"] = learners.label(config.learner)
-            groups = {"nest": colony.n_nests, "caste": len(colony.task.castes)}
+            groups = {"nest": colony.n_nests, "caste": len(task.castes)}
             parts = " and ".join(name for name, n in groups.items() if n > 1)
             shared = f"one per {parts}" if parts else "shared"
             lines["table"] = "one per ant" if colony.one_a_slot else shared
@@ -215,9 +197,9 @@ class Recorder:
             lines["discount"] = f"{config.discount:g}"
         elif colony.has_training:
             lines |= {"policy": "frozen", "epsilon": f"{colony.epsilon:g}"}
-        if colony.task.choice.rule != "greedy":
-            lines["rule of choice"] = colony.task.choice.rule
-        return [*lines.items()]
+        if task.choice.rule != "greedy":
+            lines["rule of choice"] = task.choice.rule
+        return [(name, words) for name, words in lines.items() if words]
 
     def snapshot(self) -> bytes:
         """Return a frame of the present: the first frame, or after an intervention."""
@@ -226,12 +208,9 @@ class Recorder:
     def whole(self) -> bytes:
         """Return the last frame with all data, not only changes, for a page without frames."""
         late = copy.copy(self)
-        late._numbers, late._queens = self._numbers[:0], self._queens[:0]
-        late._ground, late._trail = np.zeros_like(self._ground), np.zeros_like(self._trail)
-        late._kinds = np.zeros_like(self._kinds)
+        late._forget()
         late._known, late._owners = self._known.copy(), self._owners.copy()
-        late._table = np.full_like(self._table, np.nan)
-        return late._frame({"progress": self.progress.points()})
+        return late._frame({"progress": self.progress.points})
 
     def tick(self, n: int = 1, td_errors: np.ndarray | None = None) -> bytes:
         """Return a frame after n more ticks; it has the actions of ants only if n is 1.
@@ -268,8 +247,6 @@ class Recorder:
 
     def _tables(self) -> np.ndarray:
         """Return the rows of all tables, float32 (owners * n_states, 5)."""
-        if self._fixed is not None:
-            return self._fixed
         return self.colony.q_values[self.world].reshape(-1, N_ACTIONS)
 
     def _rows(self, slots: np.ndarray, states: np.ndarray) -> np.ndarray:
@@ -283,9 +260,9 @@ class Recorder:
 
         NaN for learners with more than one update per step, and if the learning rate is 0.
         """
-        errors = np.full(len(slots), np.nan)
+        errors, learner = np.full(len(slots), np.nan), learners.get(self.colony.training.learner)
         acted = actions >= 0  # idle ants have not
-        if not (self._has_td_errors and acted.any()):
+        if learner.td_error is None or learner.plans or not acted.any():
             return errors
         slots, states = slots[acted], states[acted]
         pairs = self._rows(slots, states) * N_ACTIONS + actions[acted]
@@ -301,17 +278,17 @@ class Recorder:
         """Return a frame of the changes since the last one, added to `sections`."""
         colony, snapshot = self.colony, self.colony.snapshot(self.world)
         outcome, slots = colony.outcome(), self._living()
-        numbers = colony.numbers[self.world, slots]
+        order = np.argsort(snapshot.ant_numbers, kind="stable")  # as `slots`
+        numbers = snapshot.ant_numbers[order]
         if not np.array_equal(numbers, self._numbers):
             sections["numbers"] = self._numbers = numbers
-        sections["cells"] = colony.cells[self.world, slots]
-        headings, carrying = colony.headings[self.world], colony.carrying[self.world]
-        sections["poses"] = (headings + 8 * carrying + 16 * colony.nests[self.world])[slots]
-        if self.colony.task.castes or self.colony.n_kinds > 1:
-            order = np.argsort(snapshot.ant_numbers, kind="stable")  # as `slots`
+        sections["cells"] = snapshot.ant_cells[order]
+        carrying, nests = snapshot.ant_carries[order], snapshot.ant_nests[order]
+        sections["poses"] = snapshot.ant_headings[order] + 8 * carrying + 16 * nests
+        if colony.task.castes or colony.n_kinds > 1:
             foods = np.maximum(snapshot.ant_foods[order], 0)
-            castes, idle = snapshot.ant_castes[order], snapshot.ant_idle[order]
-            sections["groups"] = castes + 16 * foods + 128 * idle
+            idle = snapshot.ant_idle[order]
+            sections["groups"] = snapshot.ant_castes[order] + 16 * foods + 128 * idle
         if not np.array_equal(snapshot.queens, self._queens):
             sections["queens"] = self._queens = snapshot.queens
         sections["states"] = colony.states[self.world, slots]
@@ -323,11 +300,12 @@ class Recorder:
         stored, clock = colony.stored_trail(self.world, self.pheromone)
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, clock)
         sections.setdefault("progress", self.progress.take_new_points())
-        sections |= _changes("ground", self._ground, snapshot.ground)
-        sections |= _changes("kinds", self._kinds, snapshot.food_kinds)
-        sections |= _changes("trail", self._trail, stored)
+        layers = {"ground": snapshot.ground, "kinds": snapshot.food_kinds, "trail": stored}
+        for name, layer in layers.items():
+            cells = np.flatnonzero(getattr(self, f"_{name}") != layer)
+            sections |= {f"{name}_at": cells, name: layer[cells]}
+            setattr(self, f"_{name}", layer)
         sections |= self._table_changes(slots, numbers, sections["states"])
-        self._ground, self._kinds, self._trail = snapshot.ground, snapshot.food_kinds, stored
         return pack(self.types, sections)
 
     def _table_changes(
@@ -347,12 +325,6 @@ class Recorder:
         owner, state = np.divmod(rows[row], self._n_states)
         places = (self._owners[owner] * self._n_states + state) * N_ACTIONS + action
         return {"table_at": places, "table": values[row, action]}
-
-
-def _changes(name: str, old: np.ndarray, new: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the indices at which an array has changed, and its values there."""
-    places = np.flatnonzero(old != new)
-    return {f"{name}_at": places, name: new[places]}
 
 
 def record_colony(
@@ -378,7 +350,6 @@ def record_colony(
         AntsError: A number is not allowed, or no episode has begun.
     """
     between, done = intervals(colony, ticks, frame_interval, follow), 0
-    check_progress(progress)
     recorder = Recorder(colony, world, title, follow, pheromone)
     frames = [recorder.snapshot()]
     for n in between:
@@ -387,12 +358,6 @@ def record_colony(
         if progress is not None:
             progress(done / ticks)
     return Recording(recorder.header(), frames)
-
-
-def record_episode(episode: Episode, title: str = "") -> Recording:
-    """Return a recording of an episode in which one ant follows a policy."""
-    expect("episode", episode, Episode)
-    return record_trace(episode.trace, title)
 
 
 def record_trace(trace: Trace, title: str = "") -> Recording:

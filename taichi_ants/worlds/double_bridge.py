@@ -56,13 +56,15 @@ def double_bridge(
     food's junction are as far from the queen as the junction. With larger values, the first cell of
     the short branch is nearer to her, and that of the long branch is not.
     """
-    grid = AxialGrid(bridge_ranges(short, long, mirrored, aside))
-    queen = (0, 0, 0)
-    pile, corridors = _walked(short, long, mirrored, aside)
-    to_pile = grid.distances(pile)
+    junctions, branches = bridge_paths(short, long, mirrored, aside)
+    corridors = np.concatenate([*branches, junctions])
+    x, y, z = pile = (junctions[0] + junctions[1]).tolist()
+    # One cell of rock surrounds the paths. A bridge and its mirror image have equal ranges.
+    most_x, *others = (np.maximum(corridors.max(axis=0), np.array(pile) + ROOM_RADIUS) + 2).tolist()
+    grid = AxialGrid((most_x, max(others), max(others)))
+    queen, to_pile = (0, 0, 0), grid.distances((x, y, z))
     walled = np.minimum(grid.distances(queen), to_pile) > ROOM_RADIUS
     walled[grid.index(corridors)] = False
-    branches = branch_cells(short, long, mirrored, aside)
     return World(
         grid.ranges,
         queen,
@@ -73,62 +75,30 @@ def double_bridge(
 
 
 @checked
-def bridge_ranges(
+def bridge_paths(
     short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
-) -> tuple[int, int, int]:
-    """Return the ranges of `double_bridge` with these arguments, without building the world."""
-    pile, corridors = _walked(short, long, mirrored, aside)
-    # One cell of rock surrounds the paths. A bridge and its mirror image have equal ranges.
-    x, *others = (np.maximum(corridors.max(axis=0), np.array(pile) + ROOM_RADIUS) + 2).tolist()
-    return x, max(others), max(others)
+) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Return the junctions at the nest and at the food, int64 (2, 3), and the branches.
 
-
-def _walked(
-    short: int, long: int, mirrored: bool, aside: int
-) -> tuple[tuple[int, int, int], np.ndarray]:
-    """Return the middle of the pile, and the cells (n, 3) of branches and junctions."""
-    junctions = junction_cells(short, long, mirrored, aside)
-    corridors = np.concatenate([*branch_cells(short, long, mirrored, aside), junctions])
-    x, y, z = (junctions[1] + junctions[0]).tolist()
-    return (x, y, z), corridors
-
-
-@checked
-def junction_cells(
-    short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
-) -> np.ndarray:
-    """Return the junction at the nest and the junction at the food, int64 (2, 3)."""
-    ahead = _ahead(short, long, aside)
-    cells = np.array([(_NEST_JUNCTION, 0, 0), (_NEST_JUNCTION + ahead, -aside, 0)])
-    return _placed(cells, mirrored)
-
-
-@checked
-def branch_cells(
-    short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the cells of the short and the long branch without junctions, int64 (n, 3) each."""
-    ahead = _ahead(short, long, aside)
+    These are the cells of the short and the long branch without junctions, int64 (n, 3) each.
+    """
+    for name, value, least, most, form in (
+        ("aside", aside, 0, short - MIN_STEPS, f"short - {MIN_STEPS}"),
+        ("long", long, short, 2 * short - 3 - aside, "2 * short - 3 - aside"),
+    ):
+        if not least <= value <= most:
+            raise AntsError(
+                f"`world.{name}` is {value}; with `short` {short} and `aside` {aside} it must be "
+                f"between {least} and {most} ({form})."
+            )
+    # The steps ahead, D - k, of the short branch from junction to junction. A branch with as many
+    # steps to the side as ahead would have a shortcut at its corner.
+    ahead = max(short - _BULGE - aside, (long - aside) // 2 + 1)
     right = _corridor(short - ahead - aside, ahead, -aside)
     left = _corridor(long - ahead, ahead + aside, aside)
-    return _placed(right, mirrored), _placed(left, not mirrored)
-
-
-def _ahead(short: int, long: int, aside: int) -> int:
-    """Return the steps ahead, D - k, of the short branch from junction to junction."""
-    if aside > short - MIN_STEPS:
-        raise AntsError(
-            f"`world.aside` is {aside}; with `short` {short} it must be at most "
-            f"{short - MIN_STEPS}."
-        )
-    most = 2 * short - 3 - aside
-    if not short <= long <= most:
-        raise AntsError(
-            f"`world.long` is {long}; with `short` {short} and `aside` {aside} it must be between "
-            f"{short} and {most} (2 * short - 3 - aside)."
-        )
-    # A branch with as many steps to the side as ahead would have a shortcut at its corner.
-    return max(short - _BULGE - aside, (long - aside) // 2 + 1)
+    junctions = np.array([(_NEST_JUNCTION, 0, 0), (_NEST_JUNCTION + ahead, -aside, 0)])
+    branches = _placed(right, mirrored), _placed(left, not mirrored)
+    return _placed(junctions, mirrored), branches
 
 
 def _corridor(side: int, ahead: int, shift: int) -> np.ndarray:

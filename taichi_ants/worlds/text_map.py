@@ -23,15 +23,14 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
 from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError, check_word, count, expect, shown
+from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid, cube
 from taichi_ants.task.constants import MAX_TRAIL_LEVEL
 from taichi_ants.worlds.world import World
@@ -45,9 +44,14 @@ ANTS_ON_TRAIL = "abcdef"
 
 _CELLS = {EMPTY, OBSTACLE, TRAIL, *FOODS, *QUEENS, *ANTS, *ANTS_ON_TRAIL}
 _ALLOWED = ". # t, F G H I, Q R S U, 0 to 5, a to f and blanks"
-_SETTING = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
-_REGION = re.compile(r"\s*region\s+(\w+(?:\s*,\s*\w+)*)\s*=\s*(\S)(?:\s+(\S))?\s*")
 _MARKS = "%*@+!$&/?:<>^~|-_gklmnopqrsuvwxyzABCDEJKLMNOPTVWXYZ6789"  # for regions, in this order
+_LEVEL = re.compile(r"\s*trail\s*=\s*([0-9]{1,10})\s*")
+_REGION = re.compile(r"\s*region\s+(\w+(?:\s*,\s*\w+)*)\s*=\s*(\S)(?:\s+(\S))?\s*")
+_LINES = (
+    f"above the drawing, write `trail = LEVEL` once, with a level from 1 to {MAX_TRAIL_LEVEL}, or "
+    f"`region NAME = MARK` or `region NAME = MARK CELL`, with a new mark such as {_MARKS[:5]}, and "
+    f"a cell that is one of {_ALLOWED}"
+)
 
 
 def load_map(path: str | os.PathLike[str]) -> World:
@@ -62,30 +66,33 @@ def from_text(text: str, source: str = "the map") -> World:
     AntsError, which calls the text `source`, if the map is damaged.
     """
     expect(source, text, str)
-    text = text.removeprefix("\ufeff")  # the byte-order mark, which some editors write
-    level, drawn, regions = _read(text, source)
-    axials = _axials(drawn, source)
-    ranges, origin = smallest_world(axials)
-    cells = cube(axials - origin)
+    level, regions, drawn = _read(text, source)
+    ranges, cells = _placed(drawn, source)
     grid = AxialGrid(ranges)
     undrawn = grid.exists.copy()
     undrawn[grid.index(cells)] = False
 
-    names = dict.fromkeys(name for marks in regions.values() for name in marks.names)
+    marks = np.array([character.mark for character in drawn])
     within = {
-        name: cells[[char.mark in regions and name in regions[char.mark].names for char in drawn]]
-        for name in names
+        name: cells[np.isin(marks, [mark for mark in regions if name in regions[mark].names])]
+        for region in regions.values()
+        for name in region.names
     }
-    drawn = [replace(char, mark=regions[char.mark].cell) if char.mark in regions else char
-             for char in drawn]  # fmt: skip
-    marks = np.array([char.mark for char in drawn])
+    marks = np.array([regions[mark].cell if mark in regions else mark for mark in marks])
+    queens = [mark for mark in marks if mark in QUEENS]
+    if sorted(queens) != [*QUEENS[: max(1, len(queens))]]:
+        listed = f"the queens {' '.join(queens)}" if queens else "no queen"
+        raise AntsError(
+            f"{source} has {listed}; draw the queen of each nest once, as {', '.join(QUEENS)} in "
+            "this order."
+        )
     trails = cells[np.isin(marks, [TRAIL, *ANTS_ON_TRAIL])]
     is_food = np.isin(marks, [*FOODS])
     is_ant = np.isin(marks, [*ANTS, *ANTS_ON_TRAIL])
     headings = [(ANTS + ANTS_ON_TRAIL).index(mark) % len(ANTS) for mark in marks[is_ant]]
     return World(
         ranges,
-        [cells[marks == queen][0] for queen in QUEENS if queen in marks],
+        [cells[marks == queen][0] for queen in sorted(queens)],
         foods=cells[is_food],
         food_kinds=[FOODS.index(mark) for mark in marks[is_food]],
         obstacles=np.concatenate([cells[marks == OBSTACLE], grid.cells(np.flatnonzero(undrawn))]),
@@ -97,12 +104,11 @@ def from_text(text: str, source: str = "the map") -> World:
 
 def ranges_of(text: str, source: str = "the map") -> tuple[int, int, int]:
     """Return the ranges of the world drawn in `text`, without building it."""
-    _, drawn, _ = _read(text, source)
-    return smallest_world(_axials(drawn, source))[0]
+    *_, drawn = _read(text, source)
+    return _placed(drawn, source)[0]
 
 
-@dataclass(slots=True)
-class _Drawn:
+class _Character(NamedTuple):
     """A character of a drawing; `line` counts all lines from 1, `row` lines of the drawing."""
 
     mark: str
@@ -121,95 +127,52 @@ class _Mark(NamedTuple):
     names: tuple[str, ...]
 
 
-def _read(text: str, source: str) -> tuple[int, list[_Drawn], dict[str, _Mark]]:
-    level = None
-    drawn: list[_Drawn] = []
+def _read(text: str, source: str) -> tuple[int, dict[str, _Mark], list[_Character]]:
+    """Return the level of trails, the regions by mark, and the characters of the drawing."""
+    level, row = None, 0
     regions: dict[str, _Mark] = {}
-    row = 0
+    drawn: list[_Character] = []
+    text = text.removeprefix("\ufeff")  # the byte-order mark, which some editors write
     for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1):
         if line.lstrip().startswith(";"):
             continue
-        if (setting := _SETTING.fullmatch(line)) and setting[1] != "region":
-            if level is not None or drawn:
-                raise AntsError(
-                    f"line {number} of {source} is {shown(line.strip())}; only one such line is "
-                    "allowed, above the drawing."
-                )
-            level = _read_level(f"line {number} of {source}", *setting.groups())
-            continue
-        if re.match(r"\s*region\b", line):
-            where = f"line {number} of {source}"
-            if drawn:
-                raise AntsError(f"{where} names a region; move it above the drawing.")
-            _read_region(where, line, regions)
+        if "=" in line:
+            read_level = _LEVEL.fullmatch(line) if level is None and not drawn else None
+            read_region = {} if drawn else _read_region(line, regions)
+            if read_level and 1 <= int(read_level[1]) <= MAX_TRAIL_LEVEL:
+                level = int(read_level[1])
+            elif read_region:
+                regions |= read_region
+            else:
+                where = f"line {number} of {source}"
+                raise AntsError(f"{where} is {shown(line.strip())}; {_LINES}.")
             continue
         row += 1
-        for column, mark in enumerate(line):
-            if mark != " ":
-                drawn.append(_Drawn(mark, number, row, column))
-                if mark not in _CELLS and mark not in regions:
-                    raise AntsError(f"{drawn[-1].described(source)}; use only {_ALLOWED}.")
+        drawn += [_Character(m, number, row, column) for column, m in enumerate(line) if m != " "]
+    for character in drawn:
+        if character.mark not in _CELLS and character.mark not in regions:
+            raise AntsError(f"{character.described(source)}; use only {_ALLOWED}.")
     if not drawn:
         raise AntsError(f"{source} has no cells; draw cells with {_ALLOWED}.")
-    for mark, region in regions.items():
-        if not any(char.mark == mark for char in drawn):
-            raise AntsError(
-                f"{source} has no cell {mark!r} of the region {', '.join(region.names)}; "
-                "draw one, or leave the line of the region out."
-            )
-    cell_of = {mark: region.cell for mark, region in regions.items()}
-    queens = [replace(char, mark=cell_of.get(char.mark, char.mark)) for char in drawn]
-    queens = [char for char in queens if char.mark in QUEENS]
-    for nest, mark in enumerate(QUEENS):
-        alike = [char for char in queens if char.mark == mark]
-        if not alike and (nest == 0 or any(late.mark > mark for late in queens)):
-            missing = "queen" if nest == 0 else f"queen {mark}"
-            raise AntsError(f"{source} has no {missing}; draw one cell as {mark}.")
-        if len(alike) > 1:
-            raise AntsError(
-                f"{alike[1].described(source)} a second time; draw the queen of each nest once, as "
-                f"{', '.join(QUEENS)}."
-            )
-    return DEFAULT_TRAIL_LEVEL if level is None else level, drawn, regions
+    return level or DEFAULT_TRAIL_LEVEL, regions, drawn
 
 
-def _read_region(where: str, line: str, regions: dict[str, _Mark]) -> None:
-    """Add the mark of a line such as `region gate = % #`."""
-    form = "write a name and a mark, such as `region gate = %` or `region gate = % #`"
-    matched = _REGION.fullmatch(line)
-    if matched is None:
-        raise AntsError(f"{where} is {shown(line.strip())}; {form}.")
-    names, mark, cell = matched.groups()
-    if mark in _CELLS or mark in regions or mark in "=;":
-        why = "is used already" if mark in regions else "has a meaning in maps"
-        free = " ".join(free_mark for free_mark in _MARKS[:10] if free_mark not in regions)
-        raise AntsError(f"{where} has the mark {mark!r}, which {why}; choose one of {free}.")
-    if cell is not None and cell not in _CELLS:
-        raise AntsError(f"{where} draws cells as {cell!r}; use only {_ALLOWED}.")
-    region_names = tuple(name.strip() for name in names.split(","))
-    for name in region_names:
-        check_word(f"the name of a region in {where}", name)
-    regions[mark] = _Mark(cell or EMPTY, region_names)
+def _read_region(line: str, regions: Mapping[str, _Mark]) -> dict[str, _Mark]:
+    """Return the mark of a line such as `region gate = % #`; empty if the line is wrong."""
+    read = _REGION.fullmatch(line)
+    names, mark, cell = read.groups(EMPTY) if read else ("", "", "")
+    words = tuple(name.strip() for name in names.split(","))
+    is_new = mark not in _CELLS and mark not in regions and mark not in "=;"
+    fits = is_new and cell in _CELLS and all(map(str.isidentifier, words))
+    return {mark: _Mark(cell, words)} if fits else {}
 
 
-def _read_level(where: str, name: str, value: str) -> int:
-    if name != "trail":
-        raise AntsError(f"{where} sets {shown(name)}; the only settings are trail and region.")
-    level = int(value) if re.fullmatch(r"\s*[0-9]{1,10}\s*", value) else 0
-    if not 1 <= level <= MAX_TRAIL_LEVEL:
-        raise AntsError(
-            f"{where} sets trail to {shown(value.strip())}; it must be a whole number "
-            f"from 1 to {MAX_TRAIL_LEVEL}."
-        )
-    return level
-
-
-def _axials(drawn: list[_Drawn], source: str) -> np.ndarray:
-    """Return the axial coordinates (q, r) of the characters, up to a shift: int64 (n, 2)."""
+def _placed(drawn: list[_Character], source: str) -> tuple[tuple[int, int, int], np.ndarray]:
+    """Return the ranges of the smallest world of the characters, and their cells, (n, 3)."""
     # A column is 2 r and a row r - 2 q, both up to a shift. So all cells have the same parity of
     # the column and of row - r; the majority of the characters determines it.
-    rows = np.array([char.row for char in drawn])
-    columns = np.array([char.column for char in drawn])
+    rows = np.array([character.row for character in drawn])
+    columns = np.array([character.column for character in drawn])
     odd = columns % 2
     r = (columns - odd) // 2
     grids = 2 * odd + (rows - r) % 2
@@ -220,7 +183,9 @@ def _axials(drawn: list[_Drawn], source: str) -> np.ndarray:
             f"{drawn[stray[0]].described(source)}, which is between two cells; place the cells of "
             "a line four columns apart, and offset neighbouring lines by two columns."
         )
-    return np.stack([(r - rows + grid % 2) // 2, r], axis=1)
+    axials = np.stack([(r - rows + grid % 2) // 2, r], axis=1)
+    ranges, origin = smallest_world(axials)
+    return ranges, cube(axials - origin)
 
 
 def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int, int]]:
@@ -267,23 +232,16 @@ def to_text(world: World) -> str:
     """
     expect("world", world, World)
     levels = np.unique(world.trails[:, 3])
-    if len(levels) > 1:
-        raise AntsError(
-            f"the trails have {len(levels)} levels from {levels[0]} to {levels[-1]}, but a map can "
-            "show only one; give all trails the same level."
-        )
     on_trail = {tuple(cell) for *cell, _ in world.trails.tolist()}
-    if world.n_nests > len(QUEENS) or world.n_food_kinds > len(FOODS):
-        raise AntsError(
-            f"the world has {count(world.n_nests, 'nest')} and "
-            f"{count(world.n_food_kinds, 'kind')} of food; a map can show {len(QUEENS)} of each."
-        )
     hidden = on_trail & set(map(tuple, [*world.queens.tolist(), *world.foods.tolist()]))
-    if hidden:
-        raise AntsError(
-            f"a trail lies on {min(hidden)} under the queen or food, which a map cannot show; "
-            "remove this trail."
-        )
+    for what, is_there in (
+        (f"trails of {len(levels)} levels", len(levels) > 1),
+        (f"{world.n_nests} nests", world.n_nests > len(QUEENS)),
+        (f"{world.n_food_kinds} kinds of food", world.n_food_kinds > len(FOODS)),
+        ("a trail under the queen or food", bool(hidden)),
+    ):
+        if is_there:
+            raise AntsError(f"a map cannot show {what}; remove it from the world.")
     marks = [(world.grid.cells(np.flatnonzero(world.grid.exists)), EMPTY)]
     kinds = world.kinds_by_cell()[world.grid.index(world.foods)]
     marks += [(world.obstacles, OBSTACLE)]

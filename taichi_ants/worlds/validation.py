@@ -4,74 +4,61 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import (
-    AntsError,
-    check_word,
-    checked_whole,
-    count,
-    entries_of,
-    expect,
-    shown,
-    whole,
-)
+from taichi_ants.errors import AntsError, as_array, check_word, checked_whole, entries_of, expect
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import FAR, MAX_ARRAY_CELLS, AxialGrid
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, MAX_TRAIL_LEVEL
 
 _STANDS = ("nothing", "the queen", "a food item", "an obstacle")
+_NUMBERS = {  # the fourth column of an array, and its largest value
+    "foods": ("kind", MAX_FOOD_KINDS - 1),
+    "trails": ("level", MAX_TRAIL_LEVEL),
+    "ants": ("heading", N_HEADINGS - 1),
+}
 
 
 def parse_ranges(ranges: object) -> tuple[int, int, int]:
     """Return `ranges` as three integers of at least 1; AntsError if they are not."""
-    values = _whole_numbers(ranges)
-    if len(values) != 3 or min(values) < 1 or max(values) > MAX_ARRAY_CELLS:
-        raise AntsError(
-            f"ranges are {shown(ranges)}; they must be three whole numbers (X, Y, Z) "
-            f"from 1 to {MAX_ARRAY_CELLS}."
-        )
-    return values[0], values[1], values[2]
+    x, y, z = as_array("ranges", ranges, "iu", (3,), 1, MAX_ARRAY_CELLS).tolist()
+    return x, y, z
 
 
 def parse_contents(
     grid: AxialGrid,
-    queens: object,
-    foods: object,
-    obstacles: object,
-    trails: object,
-    ants: object,
-    food_kinds: object,
+    queens: Any,
+    foods: Any,
+    food_kinds: Any,
+    obstacles: Any,
+    trails: Any,
+    ants: Any,
 ) -> dict[str, np.ndarray]:
     """Return the checked contents of a world by field, with coordinates in normal form."""
-    foods, kinds = _foods_and_kinds(foods, food_kinds)
     contents = {
         "queens": _queens(queens, grid),
-        "foods": _parse("foods", foods, grid),
+        "foods": _parse("foods", _with_kinds(foods), grid),
         "obstacles": _parse("obstacles", obstacles, grid),
-        "trails": _parse("trails", trails, grid, "level", MAX_TRAIL_LEVEL),
-        "ants": _parse("ants", ants, grid, "heading", N_HEADINGS - 1),
+        "trails": _parse("trails", trails, grid),
+        "ants": _parse("ants", ants, grid),
     }
-    contents["foods"] = np.column_stack([contents["foods"], _kinds(kinds, contents["foods"])])
+    if entries_of(food_kinds):
+        (n, _), most = contents["foods"].shape, MAX_FOOD_KINDS - 1
+        contents["foods"][:, 3] = as_array("food_kinds", food_kinds, "iu", (n,), 0, most)
     stands = np.zeros(grid.size, dtype=np.uint8)  # the content of each cell, an index of _STANDS
     for name, rows in contents.items():
         if name not in ("queens", "ants"):
             rows = rows[np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))]
         index = grid.index(rows[:, :3])
-        _, first = np.unique(index, return_index=True)
-        if len(first) < len(index):
-            again = np.delete(np.arange(len(index)), first)[0]
-            raise AntsError(
-                f"{name} contain {_cell(rows[again])} more than once; list each cell once."
-            )
+        again = np.ones(len(index), dtype=bool)
+        again[np.unique(index, return_index=True)[1]] = False
+        _refuse(name, rows, again, "is there more than once; list each cell once")
         # Trails may lie under the queen and foods.
-        (shared,) = np.nonzero(stands[index] > (2 if name == "trails" else 0))
-        if len(shared):
-            raise AntsError(
-                f"{name} contain {_cell(rows[shared[0]])}, the cell of "
-                f"{_STANDS[stands[index[shared[0]]]]}; remove one of them."
-            )
+        shared = stands[index] > (2 if name == "trails" else 0)
+        other = _STANDS[stands[index][shared][:1].max(initial=0)]
+        _refuse(name, rows, shared, f"is also the cell of {other}; remove one of them")
         stands[index] = {"queens": 1, "foods": 2, "obstacles": 3}.get(name, stands[index])
         contents[name] = rows
     contents["trails"] = contents["trails"][contents["trails"][:, 3] > 0]
@@ -109,125 +96,59 @@ def _disc(path: str, disc: Mapping, grid: AxialGrid) -> np.ndarray:
             "(x, y, z) and radius, or a list of cells."
         )
     radius = checked_whole(f"{path}.radius", disc["radius"], 0)
-    row = np.array([_row(f"{path}.centre", disc["centre"], "(x, y, z)", 3)])
-    ((x, y, z),) = _inside(f"{path}.centre", row, grid).tolist()
+    ((x, y, z),) = _parse(f"{path}.centre", [disc["centre"]], grid).tolist()
     return grid.cells(np.flatnonzero(grid.exists & (grid.distances((x, y, z)) <= radius)))
 
 
 def _queens(values: object, grid: AxialGrid) -> np.ndarray:
     """Return the cells of the queens, int32 (N, 3), from one cell or a sequence of cells."""
-    entries = entries_of(values) or []
-    is_list = bool(entries) and all(entries_of(entry) is not None for entry in entries)
-    if not is_list:
-        return _inside(
-            "queen",
-            np.array([_row("queen", values, "one cell (x, y, z), or a list of cells", 3)]),
-            grid,
-        )
-    if len(entries) > MAX_NESTS:
-        raise AntsError(
-            f"queen has {len(entries)} cells; a world has at most {MAX_NESTS} nests, so list fewer."
-        )
-    return _inside("queen", _rows("queen", entries, "(x, y, z)", 3), grid)
+    cells = as_array("queen", values, "iu")
+    queens = _parse("queen", cells[None] if cells.ndim == 1 else cells, grid)
+    if not 1 <= len(queens) <= MAX_NESTS:
+        raise AntsError(f"queen has {len(queens)} cells; give a cell for each of 1 to 7 nests.")
+    return queens
 
 
-def _foods_and_kinds(foods: object, kinds: object) -> tuple[object, object]:
-    """Return cells and kinds of food, which may be given together as ((x, y, z), kind)."""
-    if isinstance(foods, np.ndarray):
-        together = foods.ndim == 2 and foods.shape[1] == 4
-        return (foods[:, :3], foods[:, 3]) if together else (foods, kinds)
-    entries = [entries_of(entry) or [] for entry in entries_of(foods) or []]
-    paired = [len(entry) == 2 and entries_of(entry[0]) is not None for entry in entries]
-    if not any(paired):
-        return foods, kinds
-    pairs = [entry if pair else [entry, 0] for entry, pair in zip(entries, paired, strict=True)]
-    return [cell for cell, _ in pairs], [kind for _, kind in pairs]
+def _with_kinds(foods: Any) -> Any:
+    """Return rows (x, y, z, kind); the kind of each row without one is 0."""
+    rows = _flat(foods)
+    if isinstance(rows, list):
+        return [[*row, 0] if isinstance(row, list) and len(row) == 3 else row for row in rows]
+    if isinstance(rows, np.ndarray) and rows.shape[1:] == (3,):
+        return np.column_stack([rows, np.zeros_like(rows[:, :1])])
+    return rows
 
 
-def _kinds(values: object, foods: np.ndarray) -> np.ndarray:
-    """Return the kind of each food item, int32 (n, 1); without kinds, all are of the first."""
-    entries = entries_of(values)
-    if not entries:
-        return np.zeros((len(foods), 1), np.int32)
-    if len(entries) != len(foods):
-        raise AntsError(
-            f"food_kinds has {count(len(entries), 'entry')} for {count(len(foods), 'food item')}; "
-            "give one kind for each."
-        )
-    most = MAX_FOOD_KINDS - 1
-    kinds = [checked_whole(f"food_kinds[{i}]", kind, 0, most) for i, kind in enumerate(entries)]
-    return np.array(kinds, dtype=np.int32).reshape(-1, 1)
+def _flat(values: Any) -> Any:
+    """Return entries as lists, ((x, y, z), number) as (x, y, z, number); arrays unchanged."""
+    entries = None if isinstance(values, np.ndarray) else entries_of(values)
+    if entries is None:
+        return values
+    rows = [entries_of(entry) or entry for entry in entries]
+    for i, row in enumerate(rows):
+        if isinstance(row, list) and len(row) == 2 and entries_of(row[0]):
+            rows[i] = [*row[0], row[1]]
+    return rows
 
 
-def _parse(
-    name: str, values: object, grid: AxialGrid, number: str = "", most: int = 0
-) -> np.ndarray:
-    """Return entries as int32 (n, 3), or (n, 4) with a fourth column from 0 to `most`."""
-    form, columns = (f"((x, y, z), {number})", 4) if number else ("(x, y, z)", 3)
-    rows = _rows(name, values, form, columns)
-    (bad,) = np.nonzero(((rows[:, 3:] < 0) | (rows[:, 3:] > most)).any(axis=1))
-    if len(bad):
-        raise AntsError(
-            f"{name}[{bad[0]}] is {tuple(rows[bad[0]].tolist())}, but the {number} (the last "
-            f"number) must lie between 0 and {most}."
-        )
-    return _inside(name, rows, grid)
+def _parse(name: str, values: Any, grid: AxialGrid) -> np.ndarray:
+    """Return entries in normal form, int32 (n, 3), or (n, 4) if they have a number."""
+    rows, columns = _flat(values), 4 if name in _NUMBERS else 3
+    if not rows if isinstance(rows, list) else np.size(rows) == 0:
+        return np.zeros((0, columns), np.int32)
+    entries = as_array(name, rows, "iu", (None, columns), -FAR, FAR).astype(np.int64)
+    if columns == 4:
+        number, most = _NUMBERS[name]
+        as_array(f"the {number} (the last number) of {name}", entries[:, 3], "iu", None, 0, most)
+    parsed = entries.copy()
+    parsed[:, :3] -= entries[:, :3].min(axis=1, keepdims=True)
+    outside = (parsed[:, :3] >= np.array(grid.ranges)).any(axis=1)
+    form = "after the smallest coordinate is subtracted from all, x, y, z must be below"
+    _refuse(name, entries, outside, f"is outside the world; {form} {grid.ranges}")
+    return parsed.astype(np.int32)
 
 
-def _inside(name: str, entries: np.ndarray, grid: AxialGrid) -> np.ndarray:
-    """Return rows of int64 (n, 3 or more) in normal form, int32; AntsError if outside the world."""
-    rows = entries.copy()
-    rows[:, :3] -= entries[:, :3].min(axis=1, keepdims=True, initial=FAR)
-    (outside,) = np.nonzero((rows[:, :3] >= np.array(grid.ranges)).any(axis=1))
-    if len(outside):
-        entry = name if name == "queen" or name.endswith(".centre") else f"{name}[{outside[0]}]"
-        raise AntsError(
-            f"{entry} is {tuple(entries[outside[0]].tolist())}, outside the world; after the "
-            f"smallest coordinate is subtracted from all, x, y, z must be below {grid.ranges}."
-        )
-    return rows.astype(np.int32)
-
-
-def _rows(name: str, values: object, form: str, columns: int) -> np.ndarray:
-    if not isinstance(values, np.ndarray):
-        entries = entries_of(values)
-        if entries is None:
-            raise AntsError(f"{name} is {shown(values)}; it must be a sequence of {form}.")
-        rows = [_row(f"{name}[{i}]", entry, form, columns) for i, entry in enumerate(entries)]
-        return np.array(rows, dtype=np.int64).reshape(-1, columns)
-    if values.size == 0:
-        return np.zeros((0, columns), dtype=np.int64)
-    if values.dtype.kind not in "iu" or values.ndim != 2 or values.shape[1] != columns:
-        raise AntsError(
-            f"{name} is an array of shape {values.shape} and type {values.dtype}; "
-            f"it must have whole numbers and the shape (n, {columns}), with rows {form}."
-        )
-    (far,) = np.nonzero((np.abs(values.astype(np.float64)) > FAR).any(axis=1))
-    if len(far):
-        _row(f"{name}[{far[0]}]", tuple(values[far[0]].tolist()), form, columns)  # raises
-    return values.astype(np.int64)
-
-
-def _row(name: str, entry: object, form: str, columns: int) -> list[int]:
-    """Return one entry as `columns` integers; a pair (cell, number) is flattened."""
-    values = entries_of(entry) or []
-    if columns == 4 and len(values) == 2:
-        values = [*(entries_of(values[0]) or []), values[1]]
-    numbers = _whole_numbers(values)
-    if len(numbers) != columns or max(map(abs, numbers)) > FAR:
-        raise AntsError(
-            f"{name} is {shown(entry)}; it must be {form} in whole numbers up to 2**40."
-        )
-    return numbers
-
-
-def _whole_numbers(values: object) -> list[int]:
-    """Return the entries of a sequence as integers; [] if they are not whole numbers."""
-    try:
-        return [whole("", value) for value in entries_of(values) or []]
-    except AntsError:
-        return []
-
-
-def _cell(row: np.ndarray) -> tuple[int, ...]:
-    return tuple(row[:3].tolist())
+def _refuse(name: str, rows: np.ndarray, wrong: Any, why: str) -> None:
+    """Raise AntsError for the first row that is wrong, if there is one."""
+    if wrong.any():
+        raise AntsError(f"the cell {tuple(rows[wrong][0, :3].tolist())} of {name} {why}.")

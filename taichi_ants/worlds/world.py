@@ -87,7 +87,7 @@ class World:
         if len(self.other_queens):
             queens = [self.queen, *np.asarray(self.other_queens).tolist()]
         contents: dict[str, Any] = validation.parse_contents(
-            grid, queens, self.foods, self.obstacles, self.trails, self.ants, self.food_kinds
+            grid, queens, self.foods, self.food_kinds, self.obstacles, self.trails, self.ants
         )
         queens = contents.pop("queens")
         contents |= {"queen": tuple(queens[0].tolist()), "other_queens": queens[1:]}

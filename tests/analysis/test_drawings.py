@@ -8,7 +8,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from taichi_ants.analysis import style
 from taichi_ants.analysis.drawings import COLOURS, Drawing, drawing, drawings
 from taichi_ants.analysis.style import BLUE, INK, frame, legend_entries, new_figure, styled
 
@@ -80,11 +79,3 @@ def test_names_in_several_drawings_do_not_meet() -> None:
     assert not ids[0] & ids[1]
     again = drawing("one", made(look))
     assert again == several[0]  # the same figure gives the same bytes
-
-
-def test_lines_without_a_colour_have_those_of_the_project() -> None:
-    """In the order of the style, as in the figures of the models."""
-    with styled():
-        axes = new_figure(2.0).subplots()
-        lines = [axes.plot([0, number])[0] for number in range(len(style.COLOURS))]
-    assert [line.get_color() for line in lines] == list(style.COLOURS)

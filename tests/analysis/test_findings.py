@@ -22,76 +22,43 @@ SUPPORTED, CONTRADICTED = Verdict.SUPPORTED, Verdict.CONTRADICTED
 EQUIVALENT, UNDECIDED = Verdict.EQUIVALENT, Verdict.UNDECIDED
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "verdict"),
-    [
-        (1.5, 3.0, SUPPORTED),
-        (0.1, 1.1, UNDECIDED),
-        (0.1, 0.9, EQUIVALENT),
-        (-0.9, 0.9, EQUIVALENT),
-        (-0.9, -0.1, EQUIVALENT),
-        (-1.0, 1.0, EQUIVALENT),
-        (-0.5, 1.5, UNDECIDED),
-        (-math.inf, math.inf, UNDECIDED),
-        (0.0, 5.0, UNDECIDED),
-        (1.0, 5.0, UNDECIDED),
-        (-1.1, -0.1, UNDECIDED),
-        (-3.0, 0.9, UNDECIDED),
-        (-3.0, -1.1, CONTRADICTED),
-        (-3.0, -1.5, CONTRADICTED),
-    ],
-)
-def test_a_directed_claim(low: float, high: float, verdict: Verdict) -> None:
-    assert above(1.0).judge(low, high) is verdict
+ONE_SIDED, LIMITED = above(1.0), Criterion(1.0, 10.0, 1.0)
+LARGE, RANGE = Criterion(10.0, margin=2.0), Criterion(2.0, 4.0)
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "verdict"),
+    ("criterion", "intervals"),
     [
-        (1.5, 9.0, SUPPORTED),
-        (1.1, 10.0, SUPPORTED),
-        (1.1, 10.1, UNDECIDED),
-        (-0.1, 11.0, UNDECIDED),
-        (10.1, 20.0, CONTRADICTED),
-        (-9.0, -2.0, CONTRADICTED),
-        (-0.5, 0.5, EQUIVALENT),
+        (ONE_SIDED, {
+            SUPPORTED: [(1.5, 3.0)],
+            EQUIVALENT: [(0.1, 0.9), (-0.9, 0.9), (-0.9, -0.1), (-1.0, 1.0)],
+            UNDECIDED: [(0.1, 1.1), (-0.5, 1.5), (-math.inf, math.inf), (0.0, 5.0), (1.0, 5.0),
+                        (-1.1, -0.1), (-3.0, 0.9)],
+            CONTRADICTED: [(-3.0, -1.1), (-3.0, -1.5)],
+        }),
+        (LIMITED, {
+            SUPPORTED: [(1.5, 9.0), (1.1, 10.0)],
+            EQUIVALENT: [(-0.5, 0.5)],
+            UNDECIDED: [(1.1, 10.1), (-0.1, 11.0)],
+            CONTRADICTED: [(10.1, 20.0), (-9.0, -2.0)],
+        }),
+        (LARGE, {
+            SUPPORTED: [(10.5, 20.0)],
+            EQUIVALENT: [(-1.5, 1.5)],
+            UNDECIDED: [(9.5, 20.0), (1.5, 9.5), (-12.8, -1.5)],
+            CONTRADICTED: [(3.0, 9.5), (-12.8, -4.7)],
+        }),
+        (RANGE, {
+            SUPPORTED: [(2.0, 4.0), (2.5, 3.5)],
+            UNDECIDED: [(1.9, 4.0), (2.0, 4.1), (0.0, 9.0), (-math.inf, math.inf)],
+            CONTRADICTED: [(4.1, 9.0), (0.0, 1.9)],
+        }),
     ],
-)
-def test_a_directed_claim_with_a_limit(low: float, high: float, verdict: Verdict) -> None:
-    assert Criterion(1.0, 10.0, 1.0).judge(low, high) is verdict
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "verdict"),
-    [
-        (10.5, 20.0, SUPPORTED),
-        (9.5, 20.0, UNDECIDED),
-        (3.0, 9.5, CONTRADICTED),
-        (1.5, 9.5, UNDECIDED),
-        (-1.5, 1.5, EQUIVALENT),
-        (-12.8, -4.7, CONTRADICTED),
-        (-12.8, -1.5, UNDECIDED),
-    ],
-)
-def test_a_directed_claim_of_a_large_difference(low: float, high: float, verdict: Verdict) -> None:
-    assert Criterion(10.0, margin=2.0).judge(low, high) is verdict
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "verdict"),
-    [
-        (2.0, 4.0, SUPPORTED),
-        (2.5, 3.5, SUPPORTED),
-        (1.9, 4.0, UNDECIDED),
-        (2.0, 4.1, UNDECIDED),
-        (0.0, 9.0, UNDECIDED),
-        (-math.inf, math.inf, UNDECIDED),
-        (4.1, 9.0, CONTRADICTED),
-        (0.0, 1.9, CONTRADICTED),
-    ],
-)
-def test_a_claim_of_a_range(low: float, high: float, verdict: Verdict) -> None:
-    assert Criterion(2.0, 4.0).judge(low, high) is verdict
+    ids=["above", "with a limit", "a large difference", "a range"],
+)  # fmt: skip
+def test_a_criterion_judges_intervals(criterion: Criterion, intervals: dict) -> None:
+    for verdict, ends in intervals.items():
+        assert {criterion.judge(*pair) for pair in ends} == {verdict}
 
 
 def test_criteria_say_what_they_are() -> None:

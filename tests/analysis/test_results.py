@@ -108,26 +108,6 @@ def test_pandas_has_the_rows(series):
     assert wide.index.tolist() == [25, 50, 60]
 
 
-def test_parquet_has_the_rows(series, tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    series.to_parquet(tmp_path / "rows.parquet")
-    table = parquet.read_table(tmp_path / "rows.parquet").to_pylist()
-    for one, row in zip(table, series.rows(), strict=True):
-        assert str(one) == str(row)
-
-
-def test_missing_extras_are_named(series, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
-    with pytest.raises(AntsError, match=r'pip install -e "\.\[pandas\]"'):
-        series.to_pandas()
-
-
-def test_results_are_equal_by_content(series):
-    assert series == run(measures=ASKED, every=25)
-    assert series != run(measures=ASKED, every=30)
-    assert series != run()
-
-
 def test_summaries_are_means_over_seeds(series, trained):
     rows = {row["measure"]: row for row in summary(series).rows}
     means = series.deliveries.mean(axis=0)
@@ -238,7 +218,6 @@ def test_results_without_numbers_are_refused():
         (lambda one: compare(one, one, "nothing"), "no measure 'nothing'"),
         (lambda one: compare(one, run(seeds=range(1, 6)), "deliveries"), "same seeds"),
         (lambda one: compare(one, one, configurations=(0, 1)), "configuration is 1"),
-        (lambda one: compare(one, one, level=95), "level is 95"),
         (lambda one: compare(one, one, last=3), "last is 3"),
         (lambda one: plot(one, "nothing"), "choose one of deliveries, entropy.trail"),
         (lambda one: plot(one, path="plot.jpg"), "must be one of .png"),

@@ -49,18 +49,3 @@ def test_names_are_text(tmp_path):
     style.save(figure, tmp_path / "a.png")
     svg = drawing("one", figure_of(NAMES)).svg
     assert all(name in svg for name in NAMES)
-
-
-def test_a_figure_that_fails_is_reported_and_leaves_no_others(tmp_path, capsys):
-    folder = tmp_path / "figures"
-    folder.mkdir()
-    with style.all_or_none(folder):
-        (folder / "first.png").touch()
-        raise RuntimeError("latex\ncould not be found.")
-    assert not folder.exists()
-    assert capsys.readouterr().err == (
-        "warning: there are no figures, because one failed with RuntimeError: latex could not be "
-        "found.\n"
-    )
-    with pytest.raises(KeyboardInterrupt), style.all_or_none(folder):
-        raise KeyboardInterrupt

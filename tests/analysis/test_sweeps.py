@@ -64,13 +64,3 @@ def test_zeros_are_not_on_a_logarithmic_axis(zero):
         axes = Figure().subplots()
         sweeps.draw_lines(axes, lines, shared)
         assert axes.get_yscale() == "linear"
-
-
-def test_points_without_a_value_do_not_change_the_scale():
-    axes = Figure().subplots()
-    nothing = (1, np.nan, np.nan, np.nan)
-    sweeps.draw_lines(axes, {"line": [(1, 5, 4, 6), (2, 500, 400, 600)], "other": [nothing]})
-    assert axes.get_yscale() == "log"
-    axes = Figure().subplots()
-    sweeps.draw_lines(axes, {"other": [nothing]})
-    assert axes.get_yscale() == "linear"

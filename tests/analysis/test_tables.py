@@ -50,9 +50,3 @@ def test_a_table_is_the_same_in_markdown_and_in_a_terminal() -> None:
         *(["Who", "many"], ["a", "queen", "1"], ["[1,", "1]"]),
     ]
     assert lines[-2:] == ["Counted once.", "By hand."]
-
-
-def test_a_table_without_rows_shows_its_notes_alone() -> None:
-    empty = Table("Bees", ["Who"], [], ["None was seen."])
-    assert plain_text(["Insects.", empty], 40) == "Insects.\n\nNone was seen.\n"
-    assert plain_text(["Insects.", Table("Bees", ["Who"], [])], 40) == "Insects.\n"

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import peers
 import pytest
 from systems import numpy_runs
 
 from taichi_ants import Task, TrainingConfig, train, worlds
-from taichi_ants.analysis.tables import plain_text
 from taichi_ants.engines.runs.traces import trace_training
 from taichi_ants.task.events import Event
 
@@ -68,18 +66,3 @@ def test_numba_gives_the_same_runs(ours, parallel):
 
     theirs = numba_runs.train(CONFIGS, SEEDS, EPISODES, STEPS, parallel)
     assert all(map(np.array_equal, ours, theirs))
-
-
-def test_the_tables():
-    first, *_, last = peers.GROUPS["Steps of ants in a colony"]
-    absent = last._replace(name="Absent", needs=("no_such_package",))
-    groups = {"Ants": (first, last, absent)}
-    paces = {first: [(4e6, 250.0), (9e6, 240.0)], last: [(2e3, 5e5), (3e3, 4e5)]}
-    table, below = peers.tables({"Ants": paces}, groups, peers.SMALL, 2)
-    assert [row[2:] for row in table.rows] == [
-        ["6.50", "[4.000, 9.000]", "245", "1"],
-        ["0.0025", "[0.002, 0.003]", "450000", "2500"],
-    ]
-    text = plain_text([table, below], 120)
-    assert "16 ants, trails, right of way" in text
-    assert "Absent is skipped, because it requires no_such_package." in text

@@ -45,26 +45,3 @@ def test_c_gives_the_same_runs(learner, delivery, name, yardsticks):
             trained = throughput.train_in_c(yardstick, world, configs, seeds, *given)
             throughput.check_same(trained, result)
     assert deliveries > 100
-
-
-def said_by(arguments, capsys):
-    with pytest.raises(SystemExit) as end:
-        throughput.main(arguments)
-    return end.value.code, capsys.readouterr()
-
-
-SMALL = ["--seeds", "1", "--rounds", "1"]
-
-
-@pytest.mark.parametrize(
-    ("least", "why"),
-    [
-        *((one, f"{one} is not allowed") for one in ("nan", "-1", "inf")),
-        ("much", "is not a number"),
-    ],
-)
-def test_a_least_ratio_is_a_number_from_0_on(least, why, capsys):
-    code, said = said_by([*SMALL, "--least", least], capsys)
-    assert (code, said.out) == (2, "")
-    assert said.err.startswith("error: --least: ")
-    assert why in said.err

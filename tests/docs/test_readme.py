@@ -34,10 +34,6 @@ def test_the_ten_lines_print_their_number(capsys):
     exec(compile(other, "README.md", "exec"), {})
 
 
-def test_the_address_is_filled_in_one_place():
-    assert README.count("<repository address>") == 1
-
-
 def anchors(text: str) -> set[str]:
     """The anchors of the headings of a page."""
     heads = re.findall(r"^#+ (.*)$", text, re.MULTILINE)

@@ -130,14 +130,12 @@ def test_steps_in_the_wrong_order_and_wrong_actions(capsys):
     assert env.render() is None
     right = dict.fromkeys(env.agents, PICK_UP)
     for wrong, said in (
-        ({**right, "ant_3": 5}, "5; give"),
-        ({**right, "ant_3": 0.5}, "0.5; give"),
-        ({name: GIVE for name in right if name != "ant_3"}, "missing; give"),
+        ({**right, "ant_3": 5}, "ant_3 is 5; give"),
+        ({**right, "ant_3": 0.5}, "ant_3 is 0.5; give"),
+        ({name: GIVE for name in right if name != "ant_3"}, "ant_3 is None; give"),
+        ({**right, "ant_99": 1}, "ant_99 is 1; give"),
     ):
-        with pytest.raises(AssertionError, match=rf"^the action of ant_3 is {said} .*\.$"):
-            env.step(wrong)
-    for wrong in (None, [1, 1, 1], {**right, "ant_99": 1}):
-        with pytest.raises(AssertionError, match="give a dict with an action for each of agents"):
+        with pytest.raises(AssertionError, match=rf"^the action of {said} .*\.$"):
             env.step(wrong)
     env.step(right)
     *_, truncated, _ = env.step(right)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
+from same_steps import assert_same
 
 from taichi_ants import AntsError, Task, worlds
 from taichi_ants.envs.colony import HexColonyVectorEnv
@@ -27,24 +28,6 @@ def ants_of(n_worlds: int = 2, task: Task = GOES_ON, **options) -> HexColonyVect
 def guided(masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Actions that can succeed, giving and picking up above all."""
     return (masks * (rng.random(masks.shape) + [0, 0, 0, 1, 1])).argmax(axis=1)
-
-
-def assert_same(one, other) -> None:
-    """Compare what two steps or resets have returned, down to the infos."""
-    if isinstance(one, dict):
-        assert one.keys() == other.keys()
-        one, other = list(one.values()), list(other.values())
-    if isinstance(one, (tuple, list)):
-        for mine, its in zip(one, other, strict=True):
-            assert_same(mine, its)
-    elif one is None or isinstance(one, str):
-        assert one == other
-    else:
-        assert one.dtype == other.dtype
-        if one.dtype == object and len(one):
-            assert_same([*one], [*other])
-        else:
-            assert np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("form", ["cells", "index", "one_hot"])

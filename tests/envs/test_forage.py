@@ -13,6 +13,7 @@ import pytest
 from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from same_steps import assert_same
 
 from taichi_ants import AntsError, Pheromone, Task, World, task, worlds
 from taichi_ants.envs import Event, Reason
@@ -24,7 +25,7 @@ ID = "taichi_ants/HexForage-v0"
 SMALL = [worlds.open_world(seed, (8, 8, 8)) for seed in range(3)]
 SETTINGS: list[dict[str, Any]] = [
     {},
-    {"task": task.foraging(), "delivery": "continues", "evaporation": True},
+    {"task": task.foraging().replace(evaporation_in_training=True), "delivery": "continues"},
     {
         "task": Task(pheromone=Pheromone(deposit="add")),
         "delivery": "truncates",
@@ -38,19 +39,6 @@ def sensible(rng: np.random.Generator, masks: np.ndarray) -> np.ndarray:
     any_of_them = rng.integers(0, 5, len(masks))
     good = [rng.choice(np.flatnonzero(mask)) for mask in masks]
     return np.where(rng.random(len(masks)) < 0.8, good, any_of_them)
-
-
-def assert_same(ours: Any, theirs: Any, where: str = "") -> None:
-    """Equal in names, values and types."""
-    if isinstance(ours, dict):
-        assert ours.keys() == theirs.keys(), where
-        for name in ours:
-            assert_same(ours[name], theirs[name], f"{where} {name}")
-        return
-    assert ours.dtype == theirs.dtype, where
-    assert ours.shape == theirs.shape, where
-    for one, other in zip(ours.tolist(), theirs.tolist(), strict=True):
-        np.testing.assert_array_equal(one, other, err_msg=where)
 
 
 @pytest.mark.parametrize("settings", SETTINGS, ids=["paper", "foraging", "adding"])
@@ -67,23 +55,19 @@ def test_many_ants_equal_single_environments(mode, settings):
     assert ours.action_space == theirs.action_space
     assert ours.metadata["autoreset_mode"] is mode
     first, other = ours.reset(seed=5), theirs.reset(seed=5)
-    assert_same(first[0], other[0])
-    assert_same(first[1], other[1])
+    assert_same(first, other)
     masks, delivered = first[1]["action_mask"], 0
     for step in range(100):
         actions = sensible(rng, masks)
         now, then = ours.step(actions), theirs.step(actions)
-        for part in range(4):
-            assert_same(now[part], then[part], f"step {step}, part {part}")
-        assert_same(now[4], then[4], f"step {step}")
+        assert_same(now, then, f"step {step}")
         delivered += (now[4]["event"] == Event.DELIVERED).sum()
         if "final_info" in now[4]:
             delivered += (now[4]["final_info"]["event"] == Event.DELIVERED).sum()
         masks, ended = now[4]["action_mask"], now[2] | now[3]
         if mode is AutoresetMode.DISABLED and ended.any():
             now, then = (env.reset(options={"reset_mask": ended.copy()}) for env in (ours, theirs))
-            assert_same(now[0], then[0], f"reset after {step}")
-            assert_same(now[1], then[1], f"reset after {step}")
+            assert_same(now, then, f"reset after {step}")
             masks = np.where(ended[:, None], now[1]["action_mask"], masks)
     assert delivered > 2
 
@@ -190,6 +174,9 @@ def test_wrong_steps_raise_what_gymnasium_raises():
     many = HexForageVectorEnv(2, max_steps=1, autoreset_mode="Disabled")
     with pytest.raises(ResetNeeded):
         many.reset(options={"reset_mask": np.array([True, False])})
+    for seed in ([1], [1, -2], "ab"):
+        with pytest.raises((ValueError, gymnasium.error.Error), match=r"[Ss]eed"):
+            many.reset(seed=seed)
     many.reset(seed=0)
     many.step(np.zeros(2, int))
     with pytest.raises(ResetNeeded, match="environment 0 has ended"):
@@ -206,7 +193,6 @@ def test_wrong_steps_raise_what_gymnasium_raises():
         ({"world": [SMALL[0], worlds.paper()], "num_envs": 2}, "give worlds of one size"),
         ({"world": SMALL, "num_envs": 2}, "world lists 3 worlds; it must list at most 2"),
         ({"task": "maze"}, "task is 'maze'; it must be one of paper, fetching,"),
-        ({"world": {"ranges": (3, 3, 3)}}, "give a World or its `as_dict()`"),
         ({"delivery": "never"}, "delivery is 'never'"),
         ({"max_steps": 0}, "max_steps is 0"),
         ({"num_envs": 0}, "num_envs is 0"),
@@ -251,3 +237,42 @@ def test_a_delivery_ends_an_episode_as_is_asked_for(delivery, ends):
     assert delivered >= (3 if delivery == "continues" else 1)
     left = worlds.from_text(env.render()).foods
     assert len(left) == (foods if delivery == "continues" else foods - 1)
+
+
+MAZE = [1] * 16 + [3] + [1] * 16 + [4]  # delivers in the paper's world
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+@pytest.mark.parametrize("delivery", ["terminates", "continues"])
+def test_deliveries_are_counted_by_step_and_by_rollout(mode: str, delivery: str) -> None:
+    limit = 34 if mode == "Disabled" else 90
+    how = {"autoreset_mode": mode, "delivery": delivery, "max_steps": limit}
+    stepped, rolled = HexForageVectorEnv(2, **how), HexForageVectorEnv(2, **how)
+    for env in (stepped, rolled):
+        env.reset(seed=0)
+    actions = np.array([[action] * 2 for action in MAZE])
+    for row in actions:
+        infos = stepped.step(row)[4]
+    rolled.rollout(actions)
+    ended = mode == "SameStep" and delivery == "terminates"
+    counted = infos["final_info"]["deliveries"] if ended else infos["deliveries"]
+    assert counted.tolist() == [1, 1]
+    assert infos["deliveries"].tolist() == [1 - ended] * 2
+    if mode != "Disabled":
+        infos, others = (env.step([1, 1])[4]["deliveries"] for env in (stepped, rolled))
+        assert infos.tolist() == others.tolist() == [int(delivery == "continues")] * 2
+
+
+def test_worlds_and_tasks_by_name_path_and_value(tmp_path) -> None:
+    path = tmp_path / "map.txt"
+    path.write_text(worlds.to_text(worlds.paper()), "utf-8")
+
+    def played(**arguments: Any) -> str:
+        env = gymnasium.make(ID, **arguments)
+        env.reset(seed=3)
+        assert env.spec.max_episode_steps == 600
+        return str([env.step(action) for action in MAZE])
+
+    for same in ({"world": path}, {"world": str(path)}, {"task": "paper"}, {"task": task.paper()}):
+        assert played(**same) == played()
+    assert played(task="fetching") == played(task=task.fetching()) != played()

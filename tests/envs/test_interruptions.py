@@ -11,7 +11,6 @@ from interrupts import interrupted_after_launch
 
 from taichi_ants import Task
 from taichi_ants.envs.colony import HexColonyVectorEnv
-from taichi_ants.envs.colony_v0 import parallel_env
 from taichi_ants.envs.forage import HexForageVectorEnv
 
 
@@ -43,15 +42,3 @@ def test_vector_environments_know_who_has_ended(make: Any, rolls: bool, mode: st
     for _ in range(6):
         one, two = ours.step(actions[0]), theirs.step(actions[0])
         assert all(np.array_equal(one[k], two[k]) for k in range(4))
-
-
-def test_the_last_step_of_a_colony_ends_it() -> None:
-    env = parallel_env(ants=4, max_steps=2)
-    env.reset(seed=1)
-    with interrupted_after_launch():
-        env.step(dict.fromkeys(env.agents, 1))
-    *_, truncated, _ = env.step(dict.fromkeys(env.agents, 1))
-    assert all(truncated.values())
-    assert env.agents == []
-    with interrupted_after_launch():
-        env.reset()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, evaluate, rollout, tabulate, worlds
+from taichi_ants import AntsError, Task, evaluate, rollout, tabulate, worlds
 from taichi_ants.envs.forage import HexForageEnv
 from taichi_ants.envs.formats import FORMATS, Shown
 from taichi_ants.learners.policies import Policy, trail_follower
@@ -57,7 +57,7 @@ def test_what_a_function_may_not_return(returned, said) -> None:
 def test_a_policy_acts_in_one_environment_as_in_a_rollout() -> None:
     policy, rng = Policy(FOLLOWER, "paper", {}), np.random.default_rng(0)
     trace = rollout(worlds.paper(), FOLLOWER, max_steps=40)
-    env = HexForageEnv(max_steps=40, evaporation=True)
+    env = HexForageEnv(task=Task(evaporation_in_training=True), max_steps=40)
     _, info = env.reset(seed=0)
     for action in trace.actions:
         assert policy.actions(info["state"], rng) == action

@@ -102,15 +102,3 @@ def test_episodes_are_those_of_single_environments_to_the_end() -> None:
                 assert infos[i] == {}
             assert (seen[i] == one).all()
     assert {True, False} == set(ends)
-
-
-def test_what_sb3_asks_of_single_environments() -> None:
-    envs = adapted(3)
-    envs.reset()
-    assert (np.stack(envs.env_method("action_masks")) == envs.infos["action_mask"]).all()
-    (mask,) = envs.env_method("action_masks", indices=1)
-    assert mask.dtype == bool
-    assert envs.has_attr("action_masks")
-    assert not envs.has_attr("nothing")
-    with pytest.raises(ValueError, match="SameStep"):
-        type(envs)(HexForageVectorEnv(2))

@@ -9,12 +9,12 @@ import goss
 import numpy as np
 import pytest
 import utility
-from ant_system import METHODS, Search, search
+from ant_system import METHODS, search
 from command_lines import assert_one_sentence, call_script, run
 from goss import PUBLISHED, choices, class_shares, crossing_steps
 from plain_baselines import UtilityColony, bridge_choices, tours
 from random_worlds import random_world
-from utility import Foraging, forage
+from utility import forage
 
 from taichi_ants import AntsError, worlds
 from taichi_ants.grid.hexgrid import AxialGrid
@@ -139,21 +139,6 @@ def test_every_utility_delivery_and_path_equals_the_reference(name: str, setting
             assert np.array_equal(result.utilities[number, row], levels)
 
 
-def test_utilities_by_hand() -> None:
-    """One ant goes up a corridor and back; nothing evaporates."""
-    world = World((4, 1, 1), (0, 0, 0), foods=[(3, 0, 0)])
-    settings = {"ants": 1, "colonies": 1, "evaporation": 0, "exploration": 0, "discount": 0.5}
-    result = forage(world, ticks=7, **settings)
-    cells = world.grid.index([(x, 0, 0) for x in range(4)])
-    nest, food = result.utilities[0][:, cells]
-    # Ticks 1 to 3 carry the nest's reward up, 4 to 6 the food's down; in tick 7 the ant is at the
-    # nest again, and what it backs up there is 1 + half of its neighbour's.
-    assert nest.tolist() == [1.25, 0.5, 0.25, 0]
-    assert food.tolist() == [0, 0.25, 0.5, 1]
-    assert result.deliveries[0].tolist() == [0, 0, 0, 0, 0, 1, 0]
-    assert result.first_delivery.tolist() == [6]
-
-
 def test_all_colonies_find_a_shortest_way() -> None:
     result = forage(double_bridge(10, 15))
     assert result.shortest == 2 * (6 + 10 + 3)
@@ -184,16 +169,6 @@ def test_neither_threads_nor_other_colonies_change_a_colony(model: str, monkeypa
     other = results(model, seed=1)
     assert not all(map(np.array_equal, other, first))
     assert len(np.unique(first[0], axis=0)) > 1
-
-
-def test_moments_count_from_one() -> None:
-    best = np.array([[5, 4, 4], [4, 5, 6], [6, 0, 5]], np.int32)
-    assert Search(4, best, best.astype(float), 0 * best).found.tolist() == [2, 1, 0]
-    deliveries = np.array([[0, 2, 1], [1, 0, 0], [0, 0, 0]])
-    lengths = np.array([[9, 8], [8, 0], [0, 12]])
-    result = Foraging(8, deliveries, lengths, np.zeros((3, 2, 1)))
-    assert result.first_delivery.tolist() == [2, 1, 0]
-    assert result.found.tolist() == [20, 10, 0]
 
 
 @pytest.mark.parametrize("model", [search, forage])

@@ -11,20 +11,16 @@ from bridge import crossings, point, task
 from bridge_report import (
     BRIDGES,
     DESIGNS,
-    EQUAL,
     LATE,
-    SHORT_LEFT,
-    SHORT_RIGHT,
     WINDOWS,
     Design,
-    bridges,
     late_shares,
 )
 from PIL import Image
 
 from taichi_ants import AntsError, Colony, TrainingConfig
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.worlds.double_bridge import branch_cells, double_bridge, junction_cells
+from taichi_ants.worlds.double_bridge import bridge_paths, double_bridge
 
 TICKS = 100
 BRIDGE = {"short": 10, "long": 13, "mirrored": True, "aside": 1}
@@ -34,8 +30,8 @@ class Scripted:
     """A colony of ants that stand where a script says: (place, load) of each ant by tick."""
 
     def __init__(self, script: list[dict[int, tuple[str, int]]]) -> None:
-        grid, (nest, food) = double_bridge(**BRIDGE).grid, junction_cells(**BRIDGE)
-        short, long = (cells[len(cells) // 4] for cells in branch_cells(**BRIDGE))
+        grid, ((nest, food), branches) = double_bridge(**BRIDGE).grid, bridge_paths(**BRIDGE)
+        short, long = (cells[len(cells) // 4] for cells in branches)
         places = {"nest": nest, "food": food, "short": short, "long": long}
         self.places = {name: int(grid.index(cell)) for name, cell in places.items()}
         assert len(set(self.places.values())) == 4
@@ -89,7 +85,7 @@ def test_nobody_takes_the_short_branch_before_it_opens(opens: int) -> None:
     assert (before[0] == 0) == (opens > 0)
     if opens:
         assert before[1] > 10
-    short = place.grid.index(branch_cells(**BRIDGE)[0])
+    short = place.grid.index(bridge_paths(**BRIDGE)[1][0])
     assert not (colony.arrays["walls"][short]).any()
 
 
@@ -100,21 +96,6 @@ def test_colonies_learn_where_the_short_branch_lies_on_either_side() -> None:
     assert 0.4 < drawn.mean() < 0.6
     assert one.training.initial_q > 0
     assert one.training.next_epsilon(one.training.epsilon) < one.training.epsilon
-
-
-def test_a_design_is_a_task_and_bridges() -> None:
-    assert len(set(DESIGNS)) == len(DESIGNS)
-    for design in DESIGNS:
-        rules = task(design)
-        assert rules.observation == {"queueing": "queues", "foraging": "ants"}[design.rules]
-        assert rules.pheromone.fades_after == 50
-        assert rules.life.regrowth == 0
-    assert task(Design(evaporation="20")).pheromone.half_life == 20
-    assert task(Design(evaporation="none")).pheromone.evaporation == "none"
-    assert tuple(bridges(Design())) == BRIDGES
-    assert tuple(bridges(Design(aside=0))) == (SHORT_RIGHT, SHORT_LEFT, EQUAL, LATE)
-    assert LATE not in bridges(Design(ants=8))
-    assert bridges(Design())[EQUAL].get("aside", 0) == 0
 
 
 SEEDS = (3, 4, 5)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import colony_figures as figures
 import pytest
 from colony_findings import (
     ABC,
     ABROAD,
-    ALONE,
     JOINT,
     PAPER,
     QUEUES,
@@ -19,10 +16,7 @@ from colony_findings import (
     condition_rows,
 )
 from matplotlib.axes import Axes
-from PIL import Image
 from synthetic_colony_study import build
-
-from taichi_ants.analysis.style import save_all
 
 WORLD_KINDS = ("paper", "open")
 
@@ -79,17 +73,3 @@ def test_a_line_shows_the_largest_colony_of_a_design(rows, name, designs) -> Non
     )
     titles = [axis.get_title(loc="left") for axis in figure.axes]
     assert titles == ["The paper's world", "Open worlds (30, 30, 30)"]
-
-
-@pytest.mark.long
-def test_files_are_wide_enough_to_read_and_little_data_can_be_drawn(rows, tmp_path: Path) -> None:
-    save_all(figures.draw_all(rows), tmp_path / "new")
-    for name in ("rules", "scaling", "training", "elsewhere"):
-        assert Image.open(tmp_path / "new" / f"{name}.png").width == 1620
-    lonely = build(seeds=1, sizes=(1,), regimes=(JOINT,), rules=(ABC,))
-    nothing = build(lambda rules, regime, ants: 0.0, noise=0, regimes=(JOINT, ALONE))
-    elsewhere = build(seeds=2, regimes=(ABROAD,), world_kinds=("rocks",))
-    for study, number in ((lonely, 3), (nothing, 3), (elsewhere, 1)):
-        folder = tmp_path / str(len(study))
-        save_all(figures.draw_all(condition_rows(study)), folder)
-        assert len(list(folder.iterdir())) == number

@@ -12,7 +12,6 @@ from colony_findings import (
     ALONE,
     BC,
     FEW,
-    JOINT,
     PAPER,
     QUESTIONS,
     QUEUES,
@@ -20,30 +19,35 @@ from colony_findings import (
     SOME,
     A,
     Design,
-    Results,
-    condition_rows,
+    Judged,
     difference_rows,
-    found,
     judge_all,
 )
 from synthetic_colony_study import Truth, build, proportional
 
-from taichi_ants.analysis.findings import Verdict
-from taichi_ants.analysis.tables import Table
+from taichi_ants.analysis.findings import Verdict, weakest
 
 ADDS, TRAIL, MORE, TRAINING, ELSEWHERE = QUESTIONS
 
 
 def answer(question: str, truth: Truth = proportional, **settings: object) -> list[list[str]]:
-    """The lines of the table that answers a question, without the world."""
-    (rows,) = [table.rows for table in tables(truth, **settings) if table.title == question]
-    return [list(row[1:]) for row in rows]
+    """Each statement with the numbers of ants for which it is supported, contradicted or open."""
+    rows = []
+    for (_, series), findings in judged(truth, **settings).items():
+        if series.question == question:
+            sizes = sorted({n for n, _ in findings})
+            by_size = {n: [one for (ants, _), one in findings.items() if ants == n] for n in sizes}
+            verdicts = {n: weakest(several).verdict for n, several in by_size.items()}
+            known = Verdict.SUPPORTED, Verdict.CONTRADICTED
+            kinds = [[n for n in sizes if verdicts[n] is verdict] for verdict in known]
+            kinds.append([n for n in sizes if verdicts[n] not in known])
+            rows.append([series.statement, *(", ".join(map(str, kind)) or "-" for kind in kinds)])
+    return rows
 
 
 @cache
-def tables(truth: Truth, **settings: object) -> list[Table]:
-    """The tables of all questions."""
-    return [one for one in found(*Results.of(build(truth, **settings))) if isinstance(one, Table)]
+def judged(truth: Truth, **settings: object) -> Judged:
+    return judge_all(build(truth, **settings))
 
 
 def of_each(each: dict[int, float]) -> Truth:
@@ -89,9 +93,8 @@ def test_do_more_ants_help(each: dict[int, float], verdicts: list[str]) -> None:
 )
 def test_where_crowding_begins(each: dict[int, float], falls: str) -> None:
     *_, last = answer(MORE, of_each(each), noise=0.5)
-    assert last[0] == "With all three rules, each ant delivers more if there are more ants"
+    assert last[0] == "with all three rules, each ant delivers more if there are more ants"
     assert last[2] == falls
-    assert " with " in last[4]
 
 
 # By question, the designs of each statement: the first delivers more than the second.
@@ -149,33 +152,6 @@ def test_below_ten_seeds_no_difference_has_a_verdict(seeds: int, verdict: Verdic
     judged = judge_all(study)
     assert verdicts_of(judged, MORE) >= {verdict}
     assert (verdicts_of(judged) == {Verdict.TOO_FEW}) == (seeds < 10)
-    tables = [one for one in found(condition_rows(study), judged) if isinstance(one, Table)]
-    assert all((f"{seeds} seeds, too few" in one.notes[0]) == (seeds < 10) for one in tables)
-
-
-def test_missing_conditions_leave_out_only_what_needs_them() -> None:
-    judged = judge_all(build(regimes=(JOINT,), rules=(PAPER, SILENT)))
-    asked = [series.question for _, series in judged]
-    assert asked == [TRAIL, MORE]
-    assert judge_all(build(regimes=(JOINT,), rules=(PAPER,), sizes=(1,))) == {}
-
-
-def test_each_arena_and_question_is_judged_for_itself() -> None:
-    judged = judge_all(build(world_kinds=("paper", "open")))
-    assert {(world_kind, series.question) for world_kind, series in judged} == {
-        (world_kind, question) for world_kind in ("paper", "open") for question in QUESTIONS
-    }
-    for question in QUESTIONS:
-        of_question = [
-            finding
-            for (world_kind, series), findings in judged.items()
-            for finding in findings.values()
-            if (world_kind, series.question) == ("paper", question)
-        ]
-        expected = 1 - 0.05 / len(of_question)
-        assert [finding.level for finding in of_question] == pytest.approx(
-            [expected] * len(of_question)
-        )
 
 
 def test_seeds_are_paired() -> None:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from command_lines import contents, load, run
+from command_lines import contents, run
 
-from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
+from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, worlds
 from taichi_ants.task import foraging, queueing
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
@@ -20,7 +19,7 @@ SMALL = [
     *("--episodes", EPISODES, "--ticks", TICKS, "--rollouts", ROLLOUTS),
 ]
 FILES = {
-    *("conditions.csv", "differences.csv", "seeds.csv", "findings.md", "manifest.json"),
+    *("conditions.csv", "differences.csv", "seeds.csv", "manifest.json"),
     *("report.html", "report.txt", "study.json"),
     *(f"figures/{name}.png" for name in ("elsewhere", "rules", "scaling", "training")),
     *(
@@ -122,19 +121,3 @@ def assert_measured(folder, condition, outcome):
     }
     for name, values in expected.items():
         assert [float(row[name]) for row in rows] == pytest.approx(values.tolist())
-
-
-@pytest.mark.slow
-def test_policies_say_where_they_come_from(finished):
-    _, folder = finished
-    policy = load_policy(folder / "policies" / "paper_foraging_3.npz")
-    metadata = policy.metadata
-    assert policy.observation == metadata["task"]["observation"] == "ants"
-    assert (metadata["regime"], metadata["ants"], metadata["world_kind"]) == ("joint", 3, "paper")
-    assert metadata["seed"] in SEEDS
-
-
-def test_quick_has_a_folder_of_its_own():
-    parse = load("colony").parse_arguments
-    assert parse(["study"]).out == Path("results", "colony")
-    assert parse(["study", "--quick"]).out == Path("results", "colony-quick")

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import csv
-import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,11 +18,9 @@ from command_lines import (
     call,
     contents,
     load,
-    promptly,
     run,
-    start,
 )
-from paper import figures, process
+from paper import process
 
 from taichi_ants import (
     Task,
@@ -35,10 +30,8 @@ from taichi_ants import (
     train,
     worlds,
 )
-from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.files import archives
 from taichi_ants.measures.finished import Run, values_of
-from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
 
 GARDEN = EXPERIMENTS / "maps" / "garden.txt"
 SEEDS, EPISODES, MAX_STEPS, ROLLOUTS = (7, 8, 9), 60, 45, 50
@@ -81,12 +74,11 @@ SHOWN = [
     for learner in LEARNERS
     for behaviour in ("delivers", "circles_with_food")
 ]
-POLICY = f"policies/{SHOWN[0]}.npz"
 RENDERS = {f"renders/{name}.gif" for name in SHOWN}
 FILES = {
-    *("baselines.csv", "behaviours.csv", "claims.csv", "claims.md", "runs.npz"),
+    *("baselines.csv", "behaviours.csv", "claims.csv", "runs.npz"),
     *("manifest.json", "report.html", "report.txt", "study.json"),
-    *("summary.csv", "table2.csv", "table2.md"),
+    *("summary.csv", "table2.csv"),
     *(f"policies/{name}.npz" for name in SHOWN),
     *FIGURES,
     *RENDERS,
@@ -194,21 +186,6 @@ def test_runs_are_what_the_library_gives_in_the_order_of_the_summary(finished):
     assert arrays["greedy_deliveries"].any()
 
 
-def test_baselines(finished):
-    rows = {(row["baseline"], row["discount"]): row for row in read_csv(finished / "baselines.csv")}
-    assert set(rows) == {
-        *(("shortest delivery", ""), ("optimal policy", "0.9"), ("optimal policy", "0.99")),
-        *(("random policy", ""), ("trail follower", "")),
-    }
-    shortest = rows["shortest delivery", ""]
-    assert (float(shortest["return_mean"]), float(shortest["steps_mean"])) == (45, 34)
-    uniform = np.zeros((len(SEEDS), 128, 5))
-    outcome = evaluate(worlds.paper(), uniform, ROLLOUTS, SEEDS, MAX_STEPS, CALM)
-    row = rows["random policy", ""]
-    assert float(row["return_mean"]) == pytest.approx(outcome.returns.mean())
-    assert float(row["steps_mean"]) == pytest.approx(outcome.steps.mean())
-
-
 def test_policies_are_those_of_median_runs_of_each_behaviour(finished):
     rows = read_csv(finished / "summary.csv")
     for name in SHOWN:
@@ -243,24 +220,6 @@ def test_policies_are_those_of_median_runs_of_each_behaviour(finished):
         assert metadata["task"]["evaporation_in_training"] is False
 
 
-def test_behaviours_are_those_of_the_policies(finished):
-    rows = read_csv(finished / "summary.csv")
-    archive = archives.read(finished / "runs.npz")
-    behaviours, returns = archive["behaviours"], archive["policy_returns"]
-    trained = trained_as(rows, SEEDS, EPISODES, MAX_STEPS)
-    once = evaluate(worlds.paper(), trained["q_values"], 1, SEEDS, MAX_STEPS, CALM)
-    assert np.array_equal(returns, once.returns[..., 0])
-    assert np.array_equal(behaviours == DELIVERS, once.deliveries[..., 0] == 1)
-    lines = read_csv(finished / "behaviours.csv")
-    assert sum(int(line["runs"]) for line in lines) == behaviours.size
-    for number, row in enumerate(rows):
-        assert int(row["runs_delivers"]) == (behaviours[number] == DELIVERS).sum()
-        assert sum(int(row[name]) for name in COLUMNS[-4:]) == len(SEEDS)
-        mine = [line for line in lines if all(line[name] == row[name] for name in COLUMNS[:7])]
-        mean = sum(float(line["policy_return_mean"]) * int(line["runs"]) for line in mine)
-        assert mean == pytest.approx(returns[number].sum())
-
-
 @pytest.mark.parametrize(("training", "greedy"), [("on", "off"), ("off", "off")])
 def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, compare):
     flags = ["--task.evaporation-in-training", str(training == "on").lower()]
@@ -278,38 +237,12 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
     assert np.array_equal(archive["greedy_return"], rollouts.returns.mean(axis=2))
     assert np.array_equal(archive["policy_returns"], once.returns[..., 0])
     words = f"Training {'with' if training == 'on' else 'without'} evaporation of trails, greedy"
-    for name in ("report.txt", "table2.md"):
-        assert words in (out / name).read_text("utf-8")
+    assert words in (out / "report.txt").read_text("utf-8")
     first, *_ = read_csv(out / "baselines.csv")
     assert (first["baseline"] == "exact bounds") == (training == "on")
     status, _, err = compare(*TINY, "--episodes", 30, "--out", out)
     assert status == 2
     assert "task.evaporation_in_evaluation is " in err
-
-
-def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
-    """Without evaporation, as in training."""
-    name = "truncates_sarsa_circles_with_food"
-    q_values, _, metadata = load_policy(finished / "policies" / f"{name}.npz")
-    shown = (finished / "renders" / f"{name}.gif").read_bytes()
-    for evaporation in (False, True):
-        path = tmp_path / f"{evaporation}.gif"
-        task = Task(evaporation_in_evaluation=evaporation)
-        more = {"seed": metadata["seed"], "max_steps": MAX_STEPS, "task": task}
-        episode = replace(Episode.play(worlds.paper(), q_values, **more), name="circles with food")
-        pictures = frames(episode.snapshots(), (720, 480), title="SARSA, truncates")
-        save_animation(path, pictures, pause=PAUSE)
-        assert (path.read_bytes() == shown) == (not evaporation)
-
-
-def test_lists_drop_what_is_said_twice(tmp_path, compare):
-    lists = ["--discounts", "0.5", "0.9", "0.90", "--epsilons", "0.1", "0.2"]
-    status, _, _ = compare(*TINY, *lists, "--out", tmp_path / "out")
-    rows = read_csv(tmp_path / "out" / "summary.csv")
-    assert status == 0
-    assert [(row["discount"], row["epsilon"]) for row in rows] == [
-        *(("0.5", "0.1"), ("0.5", "0.2"), ("0.9", "0.1"), ("0.9", "0.2")),
-    ]
 
 
 def test_quick_takes_few_seeds_and_a_folder_of_its_own(tmp_path, compare, monkeypatch):
@@ -331,9 +264,8 @@ def test_other_worlds(world, tmp_path, compare):
     status, _, err = compare(*TINY, *chosen, "--out", tmp_path / "out")
     assert (status, err) == (0, "")
     name = "garden.txt" if world == "garden" else "open, world seed 5"
-    for file in ("report.txt", "claims.md", "table2.md"):
-        text = (tmp_path / "out" / file).read_text("utf-8")
-        assert text.startswith(f"World: {name}.\n"), file
+    text = (tmp_path / "out" / "report.txt").read_text("utf-8")
+    assert text.startswith(f"World: {name}.\n")
     assert "47.3" not in text
     verdicts = read_csv(tmp_path / "out" / "claims.csv")
     assert {row["verdict"] for row in verdicts} == {"not tested"}
@@ -358,68 +290,12 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
     cells = [line.split() for line in out.splitlines() if line.startswith("hysteretic *")]
     assert cells[0][3] == f"{returns[best]:.1f}"
     assert " paper " not in out.split("Learner")[1]  # it does not have such a learner
-    tables = (tmp_path / "out" / "table2.md").read_text("utf-8")
-    lines = [line.split(" | ") for line in tables.splitlines() if line.startswith("| hysteretic *")]
-    assert lines[4][2] == f"{greedy:.1f}"
-    assert f"hysteretic *, terminates: 0.1 / {best} / 0.3 / 0.9" in tables
+    (line,) = read_csv(tmp_path / "out" / "table2.csv")
+    assert float(line["greedy_return_mean"]) == pytest.approx(greedy)
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert f"hysteretic *, terminates: 0.1 / {best} / 0.3 / 0.9" in page
     assert "the discount is 1.0; it must be at least 0 and below 1" in page
     assert max(len(line) for line in out.splitlines()[:-2]) < 80
-
-
-def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):
-    names = ["expected_sarsa", "dyna_q", "sarsa_lambda"]
-    more = ["--training.trace-decay", "0.5"]
-    status, out, _ = compare(*TINY, "--learners", *names, *more, "--out", tmp_path / "out")
-    rows = read_csv(tmp_path / "out" / "summary.csv")
-    assert status == 0
-    assert [(row["learner"], row["hyperparameters"]) for row in rows] == [
-        ("expected_sarsa", ""),
-        *(("dyna_q", "planning_steps=3"), ("dyna_q", "planning_steps=5")),
-        ("sarsa_lambda", "trace_decay=0.5 trace_length=32"),
-    ]
-    assert "Expected SARSA" in out
-    assert "trace_decay=0.5" in " ".join(out.split())
-
-
-PICTURED = [
-    *("--seeds", 2, "--episodes", 20, "--learners", "q_learning", "sarsa", "--discounts", 0.9),
-    *("--learning-rates", 0.1, "--epsilons", 0.3, "--epsilon-decays", 0.9),
-]
-
-
-@pytest.mark.slow
-def test_an_interruption_of_the_pictures_keeps_the_runs(kernels, tmp_path):
-    """Ctrl-C on a terminal."""
-    arguments = [*PICTURED, "--out", "out"]
-    process = start("compare", arguments, kernels, tmp_path, start_new_session=True)
-    while process.poll() is None and not list((tmp_path / "out").glob(".*.tmp/policies/*")):
-        time.sleep(0.002)
-    time.sleep(0.3)
-    os.killpg(process.pid, signal.SIGINT)
-    sent = time.perf_counter()
-    out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, ""), err
-    assert err.startswith("Stopped")
-    assert err.count("\n") == 1
-    assert time.perf_counter() - sent < promptly()
-    assert len(list((tmp_path / "out" / "blocks").iterdir())) == 2 * 2
-
-
-@pytest.mark.slow  # the second process draws animations meanwhile
-def test_a_figure_that_fails_costs_no_results_and_is_drawn_later(tmp_path, compare, monkeypatch):
-    def fails(*given):
-        raise RuntimeError("no font")
-
-    arguments = [*SMALL, "--out", tmp_path / "out"]
-    with monkeypatch.context() as patch:
-        patch.setattr(figures, "save_all", fails)
-        status, _, err = compare(*arguments)
-    assert status == 0
-    assert "there are no figures, because one failed with RuntimeError: no font." in err
-    assert not FIGURES & set(contents(tmp_path / "out"))
-    assert compare(*arguments, "--force")[0] == 0
-    assert set(contents(tmp_path / "out")) >= FIGURES | RENDERS
 
 
 def test_more_seeds_keep_what_is_there_and_fewer_are_refused(tmp_path, compare):

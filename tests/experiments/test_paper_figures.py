@@ -4,38 +4,30 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from paper.comparison import DYNA_P5, FIGURE_1, SARSA, VARIANTS, Variant
+from paper.baselines import Baseline
+from paper.comparison import DYNA_P5, FIGURE_1, VARIANTS
 from paper.figures import (
     BEHAVIOUR_LOOKS,
-    draw_all,
     learning_curves,
     return_against_deliveries,
 )
-from paper.table2 import shown_position
 from synthetic_comparison import (
     Made,
     build,
     change,
-    level_truth,
-    remeasured,
-    subset,
     unchanged,
 )
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, OTHER
-from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.statistics import interquartile_mean
-from taichi_ants.analysis.style import save_all
 
 SETTINGS = ("truncates", "terminates")
-SARSA_AT = (SARSA, FIGURE_1)
 BASELINES = [
     Baseline(name, discount, figure, None if figure is None else 34.0, deliveries)
     for name, discount, figure, deliveries in (
@@ -106,22 +98,6 @@ def test_learning_curves_are_interquartile_means_of_growing_spans(comparison: Ma
     assert "the learning rate is 0.01, the discount 0.9, epsilon 0.3 and its decay 0.995" in words
 
 
-def test_a_learner_without_the_shared_configuration_is_shown_at_its_own(
-    comparison: Made,
-) -> None:
-    """And the legend names what is shown."""
-    rows = [n for n, row in enumerate(comparison.rows) if (row.variant, row.point) != SARSA_AT]
-    some = subset(comparison, rows, 6, 120)
-    figure = learning_curves(some)
-    for axis, setting in zip(panels(figure), SETTINGS, strict=False):
-        best = shown_position(some, setting, SARSA)
-        parts = np.array(
-            [some.arrays["returns"][best][:, part].mean(axis=1) for part in spans(120)]
-        )
-        line = labelled(axis)[f"SARSA, {setting}: {some.rows[best].point.label}"]
-        np.testing.assert_allclose(line.get_ydata(), interquartile_mean(parts))
-
-
 def test_returns_against_deliveries_shows_what_runs_do_and_baselines(
     comparison: Made,
 ) -> None:
@@ -154,19 +130,3 @@ def test_returns_against_deliveries_shows_what_runs_do_and_baselines(
     shared = labelled(axes[0]).keys() & labelled(axes[1]).keys()
     for name in shared:
         assert labelled(axes[0])[name].get_marker() == labelled(axes[1])[name].get_marker()
-
-
-@pytest.mark.parametrize("rows", [[0], [0, 17], list(range(12))])
-def test_subsets_and_unknown_learners_are_drawn(rows: list[int], tmp_path: Path) -> None:
-    strange = build(
-        {"elsewhere": unchanged},
-        variants=[Variant("my_learner"), Variant("dyna_q", "planning_steps=9")],
-        seeds=2,
-        episodes=4,
-        truth=level_truth,
-    )
-    strange.arrays["returns"][...] -= 75  # no logarithmic axis for negative returns
-    strange = remeasured(strange)
-    few = subset(strange, rows, 1 + len(rows) % 2, 4)
-    save_all(draw_all(few, []), tmp_path)
-    assert all(path.stat().st_size > 1000 for path in tmp_path.iterdir())

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
-from html import escape, unescape
+from html import escape
 
 import pytest
 from finished_pages import FACTS, Results, comparison_html, results
 from pages import addresses, tables
-from paper.claims import HEADLINES, claims_rows
+from paper.claims import claims_rows
 from paper.comparison import Variant
 from paper.page import Seen, comparison_page
 from synthetic_comparison import subset
 
 from taichi_ants.analysis.tables import number
-from taichi_ants.report.page import setting_facts, signed
+from taichi_ants.report.page import signed
 
 
 def page_of(results: Results) -> str:
@@ -27,33 +26,6 @@ def page_of(results: Results) -> str:
 @pytest.fixture(scope="module")
 def page() -> str:
     return comparison_html()
-
-
-def test_the_main_claims_come_first_with_their_verdicts(page: str) -> None:
-    answer = page[page.index('<section id="answer">') : page.index('<section id="table2">')]
-    rows = tables(answer)[""][1:]
-    by_id = {claim.id: (claim, findings) for claim, findings in results().audit.items()}
-    expected = [
-        [claim.statement, claim.quantity.words, *(one.verdict.value for one in findings.values())]
-        for claim, findings in (by_id[name] for name in HEADLINES)
-    ]
-    for cells, (statement, scope, *verdicts) in zip(rows, expected, strict=True):
-        assert cells[0] == f"{statement} ({scope})"
-        for cell, verdict in zip(cells[1:], verdicts, strict=True):
-            assert cell.startswith(verdict)
-    assert f"World: {results().comparison.world}." in unescape(answer)
-
-
-def test_the_mean_is_told_with_its_own_difference(page: str) -> None:
-    """The contrast that decides by the mean may be another one than that by the IQM."""
-    told = 0
-    for findings in results().audit.values():
-        for one in findings.values():
-            if one.by_mean and one.by_mean.verdict is not one.verdict:
-                verdict, label = one.by_mean.verdict.value, one.by_mean.contrast.label
-                words = f"With the mean instead of the IQM, {verdict}: {label}: "
-                told += escape(words) in page
-    assert told > 0
 
 
 def test_every_claim_has_a_line_with_the_numbers_of_the_csv(page: str) -> None:
@@ -73,33 +45,6 @@ def test_every_claim_has_a_line_with_the_numbers_of_the_csv(page: str) -> None:
             if row["verdict"] != "not tested":
                 effect = signed(number(row["effect"], digits))
                 assert f"{row['contrast']}: {effect} {row['unit']}".rstrip() in cells[0]
-
-
-def test_minus_signs_are_true_ones_wherever_a_number_stands(page: str) -> None:
-    words = re.sub(r"<(script|style|svg).*?</\1>|<[^>]+>", " ", page, flags=re.DOTALL)
-    assert "\N{MINUS SIGN}" in words
-    assert not re.findall(r"[\s(\[]-[\d.]+", words)
-    assert signed("-1.5, [-3, 4] of 1-2 --seeds 5 and Dyna-Q") == (
-        "\N{MINUS SIGN}1.5, [\N{MINUS SIGN}3, 4] of 1-2 --seeds 5 and Dyna-Q"
-    )
-
-
-def test_settings_are_facts_with_each_value_once() -> None:
-    settings = {
-        "version": "1.0",
-        "seeds": [3, 4, 5],
-        "worlds": [{"food": 1}],
-        "training.learner": ["sarsa", "sarsa", "q_learning"],
-        "training.epsilon": 0.5,
-        "task.life.births": False,
-        "task.life.lifespan": None,
-        "ants": [16, 4, 16],
-    }
-    assert setting_facts(settings) == {
-        **{"Seeds": "3 to 5", "Learner": "sarsa, q_learning", "Epsilon": "0.5"},
-        **{"Life, births": "no", "Ants": "4, 16"},
-    }
-    assert setting_facts({"seeds": [7]}) == {"Seeds": "7"}
 
 
 def test_it_asks_for_nothing_and_links_only_to_what_is_there(page: str) -> None:

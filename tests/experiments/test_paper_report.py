@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from paper.baselines import Baseline
 from paper.claims import CLAIMS, HEADLINES, assess
 from paper.comparison import DYNA_P5, FIGURE_1, SARSA, Comparison
 from paper.report import (
@@ -25,7 +26,6 @@ from paper.table2 import (
 from synthetic_comparison import build, change, remeasured, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, WALKS
-from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.tables import plain_text
 
 BASELINES = [
@@ -73,15 +73,6 @@ def section(text: str, start: str) -> str:
     return text[text.index(start) :].split("\n\n")[0]
 
 
-def test_it_is_plain_and_narrow(text: str) -> None:
-    assert "\x1b" not in text
-    assert max(len(line) for line in text.splitlines()) <= WIDTH
-    assert all(line == line.rstrip() for line in text.splitlines())
-    first, second = text.splitlines()[:2]
-    assert first == "World: the paper's."
-    assert second.startswith("128 configurations, 16 seeds, 120 episodes of at most 600 steps")
-
-
 def test_means_that_far_runs_have_moved_are_marked() -> None:
     comparison = build({"truncates": unchanged}, seeds=60, noise=5.0, shared=0.0)
     position = comparison.position("truncates", SARSA, FIGURE_1)
@@ -117,15 +108,6 @@ def test_it_counts_what_the_ants_do(comparison: Comparison) -> None:
     assert circles == [*names, "circles", "with", "food", "12", rest, "220.0", "45.0"]
     assert row(terminates, "SARSA")[1:4] == ["terminates", "delivers", "16"]
     assert "circles with food: with food, at least every fourth step leads nearer" in table
-
-
-def test_a_small_comparison_is_shown_too() -> None:
-    one = subset(build({"terminates": unchanged}, variants=[SARSA]), [3], 1, 7)
-    text = render(one)
-    assert "\n1 configuration, 1 seed, 7 episodes of at most 600 steps, 3 greedy ro" in text
-    mean = float(one.arrays["returns"].mean())
-    assert row(text, "SARSA *", after="Return, all 7")[3] == f"{mean:.1f}"
-    assert "nan" not in text
 
 
 def test_the_terminal_shows_what_fits_on_one_screen(comparison: Comparison) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,16 +9,12 @@ import pytest
 from paper.comparison import (
     DYNA_P3,
     FIGURE_1,
-    GRID,
     Q_LEARNING,
     SARSA,
-    TABLE_2,
     VARIANTS,
     Comparison,
-    Row,
     Variant,
 )
-from paper.report import table2_markdown
 from paper.table2 import (
     Line,
     best_of,
@@ -34,8 +29,6 @@ from synthetic_comparison import build, remeasured, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, OTHER
 from taichi_ants.analysis.statistics import bootstrap_interval, interquartile_mean
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.task import Task
 
 
 def lines_of(comparison: Comparison, draws: int = 50) -> list[Line]:
@@ -87,12 +80,6 @@ def test_seeds_of_the_configurations_are_independent() -> None:
     assert (best["return_last50"] == 50).mean() == pytest.approx(0.75, abs=0.01)
 
 
-def test_percentiles_count_ties_by_half() -> None:
-    values = np.array([1.0, 2.0, 2.0, 3.0])
-    for figure, percentile in ((2.0, 50), (0.5, 0), (2.5, 75), (9.0, 100)):
-        assert best_run(values, figure)["paper_percentile"] == percentile
-
-
 def test_table2_lines(comparison: Comparison) -> None:
     lines, summary = lines_of(comparison, 2000), summarise(comparison)
     assert [(line.delivery, line.summary.row.variant) for line in lines] == [
@@ -114,18 +101,6 @@ def test_table2_lines(comparison: Comparison) -> None:
         )
     percentile = line["best_run_return_last50_paper_percentile"]
     assert percentile == best_run(best["return_last50"], 47.3)["paper_percentile"]
-
-
-def test_another_world_has_nothing_of_the_paper(comparison: Comparison) -> None:
-    garden = replace(comparison, world="garden.txt")
-    lines = lines_of(garden)
-    assert len(lines) == 8
-    assert not any(line.paper_configuration for line in lines)
-    assert all(math.isnan(line.of_paper("return")) for line in lines)
-    assert all(math.isnan(line.best_run["steps_all"]["paper_percentile"]) for line in lines)
-    text = table2_markdown(garden, lines)
-    assert text.startswith("World: garden.txt.\n")
-    assert "| Learner | Delivery | Mean | IQM | Best run |" in text
 
 
 def test_what_stands_for_a_learner(comparison: Comparison) -> None:
@@ -182,50 +157,6 @@ def test_a_behaviour_that_no_shown_configuration_has_gets_an_example(
     assert row == many
     assert codes[row, run] == OTHER
     assert example_name(changed, row, run).endswith("_other")
-
-
-def test_hyperparameters_with_the_same_first_letter_are_named_in_full() -> None:
-    assert DYNA_P3.label == "Dyna-Q (p3)"
-    alike = Variant("sarsa_lambda", "trace_decay=0.9 trace_length=32")
-    assert alike.label == "SARSA(lambda) (trace_decay=0.9, trace_length=32)"
-    assert Variant("mine", "depth=2 alpha=0.1").label == "mine (d2, a0.1)"
-
-
-def test_rows_are_found_by_what_they_are() -> None:
-    comparison = build({"terminates": unchanged, "truncates": unchanged}, seeds=2)
-    assert comparison.delivery_settings == ("terminates", "truncates")
-    assert comparison.variants == VARIANTS
-    position = comparison.position("terminates", DYNA_P3, FIGURE_1)
-    assert comparison.rows[position] == Row("terminates", DYNA_P3, FIGURE_1)
-    assert comparison.positions("terminates", SARSA) == list(range(16, 32))
-    assert (
-        comparison.position("terminates", Variant("dyna_q", "planning_steps=4"), FIGURE_1) is None
-    )
-    assert comparison.position("elsewhere", DYNA_P3, FIGURE_1) is None
-    assert comparison.episodes == 120
-    few = subset(comparison, [0, 1, 16, 64], 2, 120)
-    assert few.learners == [
-        *(("terminates", Q_LEARNING), ("terminates", SARSA), ("truncates", Q_LEARNING)),
-    ]
-
-
-def test_a_training_configuration_becomes_a_row() -> None:
-    config = TrainingConfig("dyna_q", 0.01, 0.9, 0.3, 0.995, planning_steps=3)
-    row = Row.of(Task(), config)
-    assert row == Row("terminates", DYNA_P3, FIGURE_1)
-    assert (row.variant.label, row.point.label) == ("Dyna-Q (p3)", "0.01 / 0.9 / 0.3 / 0.995")
-    assert row.columns() == {
-        **{"learner": "dyna_q", "hyperparameters": "planning_steps=3"},
-        **FIGURE_1._asdict(),
-        "delivery": "terminates",
-    }
-
-
-def test_the_papers_numbers_fit_together() -> None:
-    assert len(set(GRID)) == 16
-    assert set(TABLE_2) == set(VARIANTS)
-    assert all(row.point in GRID for row in TABLE_2.values())
-    assert FIGURE_1 in GRID
 
 
 def test_a_line_by_hand() -> None:

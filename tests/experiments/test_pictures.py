@@ -265,7 +265,7 @@ def test_letters_of_their_own_are_explained_on_the_sheet_and_in_the_panel(name, 
     strange = set("".join(one.partition(" ")[2] for one in names)) - set(" -EOTSFQ")
     policy_sheet(table, task=task)
     (legend,) = (line for line in lines if line.startswith("E empty"))
-    beside = dict(Episode.play(paper(), table, max_steps=1, task=task)._status(0, 0).lines)
+    beside = dict(next(Episode.play(paper(), table, max_steps=1, task=task).snapshots())[1].lines)
     assert task.sees.letters in legend
     assert beside.get("", "") == task.sees.letters
     assert {word.strip(",") for word in task.sees.letters.split()} >= strange

@@ -27,12 +27,15 @@ from typing import Any
 
 HERE = Path(__file__).parent
 ROOT, RECORDED = HERE.parents[1], HERE / "golden.json"
-sys.path[:0] = [path for path in map(str, (ROOT, HERE)) if path not in sys.path]
+PLACES = map(str, (ROOT, HERE, HERE.parent / "support"))
+sys.path[:0] = [path for path in PLACES if path not in sys.path]
 os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")  # compiles faster, with equal results
 
 import drawing  # noqa: E402
 import frozen_rules  # noqa: E402
 import numpy as np  # noqa: E402
+from random_colonies import RandomColony, forager  # noqa: E402
+from random_worlds import random_world  # noqa: E402
 
 from taichi_ants import (  # noqa: E402
     PHYSICS,
@@ -155,14 +158,10 @@ def add_all(digest: Digest, record: Any, names: Iterable[str]) -> None:
     digest.add(*(getattr(record, name) for name in names if getattr(record, name) is not None))
 
 
-def of_colony(drawn: drawing.Drawn, schedule: str) -> str:
+def of_colony(drawn: RandomColony, schedule: str) -> str:
     """Return hashes of two worlds: after each ten of 2 * 40 ticks, and after 30 with a protocol."""
-    world, task, population, training, seed, sharing, q_values = drawn
-    colony = Colony(
-        *(world, task, training, [seed, seed + 1]),
-        **{**population, "sharing": sharing, "q_values": q_values},
-        schedule=schedule,
-    )
+    world, task, training, seed = drawn.model
+    colony = Colony(world, task, training, [seed, seed + 1], **drawn.options, schedule=schedule)
     digest, found = Digest(), []
     for _ in range(2):
         colony.begin_episode(40)
@@ -267,16 +266,13 @@ def column_values(cells: tuple[str, ...]) -> np.ndarray:
 def frames() -> Iterator[tuple[str, str]]:
     """Yield hashes of twenty frames: worlds, an ant that follows a policy, and colonies."""
     pictures = [rendering.picture(worlds.paper())]
-    pictures += [rendering.picture(drawing.random_world(seed), (320, 240)) for seed in range(4)]
-    table = drawing.forager("paper")
+    pictures += [rendering.picture(random_world(seed), (320, 240)) for seed in range(4)]
+    table = forager("paper")
     episode = rendering.Episode.play(worlds.paper(), table, seed=3, max_steps=5)
     pictures += list(rendering.frames(episode.snapshots(), (500, 300)))[:5]
     for group in ("nests", "castes_fields"):
-        _, (world, task, population, training, seed, sharing, q_values) = next(
-            drawing.colonies_of(group, 1)
-        )
-        rules = {**population, "sharing": sharing, "q_values": q_values}
-        colony = Colony(world, task, training, seed, **rules)
+        _, drawn = next(drawing.colonies_of(group, 1))
+        colony = Colony(*drawn.model, **drawn.options)
         colony.begin_episode()
         snapshots = rendering.colony_snapshots(colony, 20, 5, follow=0)
         pictures += list(rendering.frames(snapshots, (400, 400)))

@@ -95,6 +95,21 @@ def test_what_is_natural_works(like, td_error, engine):
     assert np.array_equal(values, engine(like))
 
 
+def test_a_learner_of_ones_own_is_replaced():
+    """As in a cell of a notebook that is run again; the next training uses the new one."""
+    tables = []
+    for td_error in (natural_q_learning, of_reward):
+        register(td_learner("mine", td_error))
+        tables.append(in_runs())
+    assert not np.array_equal(*tables)
+    assert registry.names().count("mine") == 1
+
+
+@ti.func
+def of_reward(value, reward, discount, next_values, next_action, epsilon):
+    return reward - value
+
+
 @ti.func
 def of_a_vector(value, reward, discount, next_values, next_action, epsilon):
     return reward + discount * next_values - value
@@ -103,11 +118,6 @@ def of_a_vector(value, reward, discount, next_values, next_action, epsilon):
 @ti.func
 def of_nothing(value, reward, discount, next_values, next_action, epsilon):
     reward + value
-
-
-@ti.func
-def of_a_truth(value, reward, discount, next_values, next_action, epsilon):
-    return True
 
 
 @ti.func
@@ -134,8 +144,7 @@ def of_a_lost_name(value, reward, discount, next_values, next_action, epsilon):
     ("td_error", "says"),
     [
         (of_a_vector, "it returns a vector"),
-        (of_nothing, "returns nothing"),
-        (of_a_truth, "returns a value of the type bool where"),
+        (of_nothing, "NoneType"),
         (of_itself, "recursion"),
         (of_a_lost_name, '"lost" is not defined'),
     ],
@@ -153,9 +162,8 @@ def test_what_taichi_cannot_compile_is_named_and_taichi_goes_on(td_error, says, 
     assert in_runs("q_learning").any()
 
 
-@ti.func
-def of_three(value, reward, discount):
-    return reward - value
+def plain(memory, at, step, rates, random_state):
+    return 0.0, random_state
 
 
 @dataclass(frozen=True)
@@ -286,19 +294,12 @@ FAILS = "learner 'mine' cannot be used: "
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"learn": of_three}, "the function learn of 'mine' has 3 arguments; it needs 5: memory"),
+        ({"learn": plain}, "learn of 'mine' is not a Taichi function; decorate it with @ti.func."),
         ({"hyperparameters": Clashing}, "'discount' is a setting of all learners"),
-        (
-            {"hyperparameters": OfText},
-            f"{FAILS}hyperparameters fails (the field kind has the type ",
-        ),
-        (
-            {"hyperparameters": OutOfRange},
-            f"{FAILS}hyperparameters fails (`training.depth` is 3; it must be",
-        ),
-        ({"memory": lambda settings, n: None}, f"{FAILS}memory fails (its result is None; it"),
-        ({"memory": lambda settings, n: n / 0}, f"{FAILS}memory fails (division by zero)"),
-        ({"cost": lambda settings: -1}, f"{FAILS}cost fails (it returns -1, which must be above"),
+        ({"hyperparameters": OfText}, f"{FAILS}the field kind has the type "),
+        ({"hyperparameters": OutOfRange}, f"{FAILS}`training.depth` is 3; it must be"),
+        ({"memory": lambda settings, n: None}, f"{FAILS}the result of memory is None; it must be"),
+        ({"cost": lambda settings: 1 / 0}, f"{FAILS}division by zero"),
     ],
 )
 def test_learners_that_are_refused_when_they_are_registered(changes, says):
@@ -306,6 +307,8 @@ def test_learners_that_are_refused_when_they_are_registered(changes, says):
         register(replace(with_memory(), **changes))
     assert str(caught.value).startswith(says)
     assert "mine" not in registry.names()
+    with pytest.raises(AntsError, match=r"^learner is .*; it must be a Learner\.$"):
+        register(natural_sarsa)
 
 
 def test_the_examples_memory_makes_the_difference(tmp_path):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -62,12 +61,6 @@ def test_a_policy_comes_back_from_its_file(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["policy"]
 
 
-def write(path: Path, q_values: Any = random_policy(), **changes: Any) -> None:  # noqa: B008
-    """Write a policy file as other programs do, with some facts exchanged."""
-    facts = {"kind": "policy", "version": 2, "observation": "paper", "metadata": {}, **changes}
-    np.savez(path, q_values=q_values, facts=json.dumps(facts))
-
-
 def task_of(path, metadata, observation="ants"):
     save_policy(path, random_policy(observation), metadata, observation)
     return load_policy(path).task
@@ -90,10 +83,8 @@ def test_a_policy_knows_the_rules_for_which_it_was_made(tmp_path: Path) -> None:
         (np.zeros((127, 5)), r"\(127, 5\)"),
         (np.zeros(640), r"\(640,\)"),
         (np.full((128, 5), np.nan), "nan for state 0 and action 0"),
-        (np.full((128, 5), np.inf), "inf"),
         (np.full((128, 5), 1e300), "inf"),
         (np.full((128, 5), "a"), "real numbers"),
-        (np.zeros((128, 5), complex), "real numbers"),
         (np.zeros((128, 5), bool), "real numbers"),
     ],
 )
@@ -103,8 +94,11 @@ def test_values_that_are_no_policy_are_refused_both_ways(
     path = tmp_path / "policy.npz"
     with pytest.raises(AntsError, match=message):
         save_policy(path, q_values, {})
+    with pytest.raises(AntsError, match="metadata is None; it must be a mapping"):
+        save_policy(path, random_policy(), None)  # type: ignore[arg-type]
     assert list(tmp_path.iterdir()) == []
-    write(path, q_values=q_values)
+    facts = {"kind": "policy", "version": 2, "observation": "paper", "metadata": {}}
+    np.savez(path, q_values=q_values, facts=json.dumps(facts))  # as other programs do
     with pytest.raises(AntsError, match=message) as raised:
         load_policy(path)
     assert str(path) in str(raised.value)
@@ -113,7 +107,6 @@ def test_values_that_are_no_policy_are_refused_both_ways(
 @pytest.mark.parametrize(
     ("arrays", "said"),
     [
-        ({"q_values": random_policy(), "observation": "paper", "metadata": "{}"}, "not contain"),
         ({"q_values": random_policy(), "facts": '{"a":' * 100_000}, "not contain a policy"),
         ({"facts": '{"kind": "policy", "version": 2}'}, "damaged"),
     ],
@@ -123,23 +116,3 @@ def test_other_archives_are_refused(tmp_path: Path, arrays: dict, said: str) -> 
     np.savez(path, **arrays)
     with pytest.raises(AntsError, match=f"{said}.*; name a file that save_policy wrote"):
         load_policy(path)
-
-
-@pytest.mark.parametrize(
-    ("path", "q_values", "metadata", "message"),
-    [
-        (1, random_policy(), {}, "path is 1; it must be text or a path"),
-        (None, random_policy(), {}, "path is None"),
-        (b"p.npz", random_policy(), {}, "path is b'p.npz'"),
-        ("p.npz", [[1, 2], [3]], {}, "array of real numbers"),
-        ("p.npz", None, {}, "q_values is None; .* real numbers"),
-        ("p.npz", random_policy(), None, "metadata is None; it must be a mapping"),
-    ],
-)
-def test_what_cannot_be_a_policy_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path, q_values, metadata, message
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(AntsError, match=message):
-        save_policy(path, q_values, metadata)
-    assert list(tmp_path.iterdir()) == []

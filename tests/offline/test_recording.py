@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plain_runs import train_with_tables
+from plain_runs import run_episode, train_with_tables
 from random_worlds import random_world
 
 from taichi_ants import (
@@ -98,7 +98,7 @@ def test_ants_of_a_colony_that_appear_and_die(learner, sharing, delivery, life):
     for episode in range(2):
         tables, epsilon = plain.q_values, plain.epsilon
         before = tables
-        for steps in plain.run_episode(40):
+        for steps in run_episode(plain, 40):
             for step in steps:
                 ant = lives.setdefault((episode, step.number), [])
                 early = learner == "sarsa" and bool(ant)

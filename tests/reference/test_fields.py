@@ -17,7 +17,7 @@ def begun_with(world=OPEN, **fields):
 
 
 def levels(colony, name):
-    trail = colony.world.fields[name]
+    trail = colony.world.pheromones[name]
     return {c: int(trail.level(c)) for c in colony.world.ground if trail.level(c)}
 
 
@@ -84,7 +84,7 @@ def test_an_ant_with_food_sees_the_homing_field_in_place_of_the_compass():
     for view, left in (("half", 2), ("strongest", 0)):
         task = {"fields": {"home": Field("none", view=view)}, "homing_cue": "home"}
         colony = begun(OPEN, **task)
-        home = colony.world.fields["home"]
+        home = colony.world.pheromones["home"]
         home.lay((3, 3, 0), 90)
         home.lay((2, 2, 0), 60)  # left of the ant
         load(colony, 0)
@@ -95,6 +95,6 @@ def test_an_ant_without_food_sees_the_outbound_field_in_place_of_the_trail():
     world = World((9, 9, 1), (8, 8, 0), [(4, 8, 0)], trails=[((3, 3, 0), 9)], ants=[((2, 3, 0), 0)])
     colony = begun(world, fields={"scout": Field("none")}, outbound_cue="scout")
     assert colony.ants[0].paper_state == 0
-    colony.world.fields["scout"].lay((3, 3, 0), 1)
+    colony.world.pheromones["scout"].lay((3, 3, 0), 1)
     colony.observe(colony.ants[0])
     assert colony.ants[0].paper_state == 4 * 2

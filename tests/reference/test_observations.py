@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from colonies import begun, load, training
+from plain_runs import run_episode
 from random_worlds import random_world
 
 from taichi_ants.reference import OBSERVATIONS, ReferenceColony
@@ -47,7 +48,7 @@ def test_the_papers_row_is_the_paper_state():
     assert state_of(AROUND, "paper") == PERCEPT
     for seed in range(30):
         colony = ReferenceColony(random_world(seed), None, training(epsilon=1.0), seed)
-        for [step] in colony.run_episode(40):
+        for [step] in run_episode(colony, 40):
             assert colony.ants[0].state == colony.ants[0].paper_state == step.next_state
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from colonies import foods_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_runs import run
 from random_choices import NO_NOISE, NOISE
 from random_colonies import random_colony
 
@@ -116,7 +117,7 @@ def test_a_run_depends_on_its_seed_alone(seed):
     runs = []
     for _ in range(2):
         colony = made(random_colony(seed))
-        colony.run(2, 30)
+        run(colony, 2, 30)
         runs.append(colony)
     first, second = runs
     assert first.records == second.records

@@ -13,7 +13,7 @@ from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import existing_cells
 from taichi_ants.reference.observations import observe
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task import Pheromone, Task
+from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds.world import World
 
@@ -53,7 +53,7 @@ def worlds(draw) -> World:
 
 def states_everywhere(world: World) -> set[int]:
     """What ants see from each free cell in each heading, with and without food."""
-    state = WorldState(world, Pheromone())
+    state = WorldState(world, Task())
     free = [cell for cell in existing_cells(world.ranges) if state.content(cell) == EMPTY]
     places = itertools.product(free, range(6), (False, True))
     return {observe(state, Ant(*place)) for place in places}
@@ -92,6 +92,6 @@ def test_all_hundred_can_be_seen():
             obstacles=[cell for cell, what in held.items() if what == "o"],
             trails=[(cell, 9) for cell, what in held.items() if what == "t"],
         )
-        state = WorldState(world, Pheromone())
+        state = WorldState(world, Task())
         seen |= {observe(state, Ant((0, 0, 0), 1, carries)) for carries in (False, True)}
     assert seen == REACHABLE

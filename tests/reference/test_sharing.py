@@ -5,8 +5,6 @@ Learning rate and discount are 1/2 throughout.
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 from colonies import GAMMA, act, begun, load, training
@@ -15,17 +13,17 @@ from transitions import transition
 from taichi_ants.learners.config import update_weights
 from taichi_ants.reference import LEARNERS
 from taichi_ants.reference.random_stream import RandomStream
-from taichi_ants.reference.sharing import SharedTable, mean_error
+from taichi_ants.reference.sharing import learn_together, mean_error
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
 
 
-def maker(learner, **settings):
-    return partial(LEARNERS[learner], training(learner, **settings), 128)
+def shared(learner="q_learning", q_values=None, **settings):
+    return LEARNERS[learner](training(learner, **settings), 128, q_values)
 
 
-def shared(learner="q_learning", slots=8, q_values=None, **settings):
-    return SharedTable(maker(learner, **settings), slots, q_values)
+def learn(learner, steps, streams):
+    learn_together(learner, steps, streams, epsilon=0.0, most=8)
 
 
 def streams(n, state=0):
@@ -45,27 +43,27 @@ def table(**values):
     return q_values
 
 
-def changed(learners):
+def changed(learner):
     """The values that are not zero, by state and action."""
-    q_values = learners.tables[0].table()
+    q_values = learner.table()
     return {(int(s), int(a)): float(q_values[s, a]) for s, a in np.argwhere(q_values)}
 
 
 def test_three_errors_of_one_pair_and_one_of_another():
     # Errors by the table as it was before: 3 + 4/2 - 2 = 3, -1 + 0 - 2 = -3, 10 - 2 = 8 (ended);
     # the mean 8/3 times 1 - 1/8; both in float32. The other pair: 1 + 2/2 - 4 = -2.
-    learners = shared(q_values=table(s0a1=2, s5a0=4))
+    learner = shared(q_values=table(s0a1=2, s5a0=4))
     steps = [
         transition(0, 1, 3, 5),
         transition(5, 0, 1, 0, number=1),
         transition(0, 1, -1, 6, number=2),
         transition(0, 1, 10, 5, number=3, terminated=True),
     ]
-    learners.learn(steps, streams(4), 0.0)
+    learn(learner, steps, streams(4))
     assert [step.td_error for step in steps] == [3, -2, -3, 8]
     mean = np.float32(8 / 3)
     value = np.float32(2) + np.float32(0.875) * mean
-    assert changed(learners) == {(0, 1): float(value), (5, 0): 3.0}
+    assert changed(learner) == {(0, 1): float(value), (5, 0): 3.0}
 
 
 @pytest.mark.parametrize(
@@ -117,18 +115,19 @@ def test_sarsa_chooses_by_the_table_before_the_update(learner, then):
     assert [step.action for step in colony.transitions] == [then] * 2
 
 
-def entries(learners):
+def entries(learner):
     return [
         (*pair, seen.reward, seen.next_state, seen.terminated)
-        for pair, seen in learners.tables[0].model.items()
+        for pair, seen in learner.model.items()
     ]
 
 
 def test_the_model_of_all():
-    learners = shared("dyna_q", learning_rate=1.0, planning_steps=1)
+    learner = shared("dyna_q", learning_rate=1.0, planning_steps=1)
     # Of one pair the highest number counts (not the slot, not the place in the list), and new
     # pairs come in ascending order of 5 * state + action.
-    learners.learn(
+    learn(
+        learner,
         [
             transition(9, 2, 0, 3, number=4, slot=1),
             transition(7, 3, 3, 4, number=7, slot=0),
@@ -136,30 +135,29 @@ def test_the_model_of_all():
             transition(7, 0, 1, 6, number=9, slot=2),
         ],
         streams(4),
-        0.0,
     )
     first = [(7, 0, 1, 6, False), (7, 3, 3, 4, False), (9, 2, 0, 3, False)]
-    assert entries(learners) == first
+    assert entries(learner) == first
     # Pairs known already keep their places; what was seen last replaces what was seen before, be
     # the ant's number as low as it may.
-    learners.learn(
+    learn(
+        learner,
         [transition(9, 2, 10, 1, number=0, terminated=True), transition(1, 1, 0, 2, number=1)],
         streams(2),
-        0.0,
     )
-    assert entries(learners) == [*first[:2], (9, 2, 10, 1, True), (1, 1, 0, 2, False)]
+    assert entries(learner) == [*first[:2], (9, 2, 10, 1, True), (1, 1, 0, 2, False)]
 
 
 def test_a_round_of_planning_by_hand():
     # Real updates: pair (0, 1), reward 8, ended, by two ants: 8 * 3/4 = 6. Then one round: both
     # draw the one visited pair, error 8 - 6 = 2, twice: 6 + 2 * 3/4 = 7.5. Another: 7.875.
     for rounds, value in ((1, 7.5), (2, 7.875)):
-        learners = shared("dyna_q", planning_steps=rounds)
+        learner = shared("dyna_q", planning_steps=rounds)
         ants = streams(2)
         steps = [transition(0, 1, 8, 5, number=k, terminated=True) for k in range(2)]
-        learners.learn(steps, ants, 0.0)
+        learn(learner, steps, ants)
         assert [step.td_error for step in steps] == [8, 8]  # of the real transitions alone
-        assert changed(learners) == {(0, 1): value}
+        assert changed(learner) == {(0, 1): value}
         assert [stream.state for stream in ants] == [rounds * GAMMA % 2**64] * 2
 
 
@@ -177,10 +175,10 @@ def test_an_ant_born_into_a_slot_begins_with_nothing():
     load(colony, 0)
     act(colony, GIVE, FORWARD)
     assert sorted(colony.ants) == [0, 2]
-    assert len(colony.learners.tables[1].model) == 1
+    assert len(colony.learners[1].model) == 1
     load(colony, 0)
     act(colony, GIVE, PICK_UP)
-    tables, learners = colony.q_values, colony.learners.tables
+    tables, learners = colony.q_values, colony.learners
     assert {slot: ant.number for slot, ant in colony.ants.items()} == {0: 0, 1: 3, 2: 2}
     assert not tables[1].any()
     assert learners[1].model == {}

@@ -7,8 +7,8 @@ import pytest
 from colonies import act, begun, load
 
 from taichi_ants.reference.geometry import neighbour
-from taichi_ants.reference.world_state import Trail
-from taichi_ants.task import Pheromone
+from taichi_ants.reference.world_state import WorldState
+from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
 from taichi_ants.worlds import World
 
@@ -20,6 +20,10 @@ def plain_world(level=1000, at=MIDDLE, ranges=(5, 5, 5), obstacles=()):
     return World(ranges, FAR_QUEEN, trails=[(at, level)], obstacles=obstacles)
 
 
+def trail_of(world, pheromone):
+    return WorldState(world, Task(pheromone=pheromone)).trail
+
+
 def after(trail, ticks):
     for _ in range(ticks):
         trail.tick()
@@ -28,7 +32,7 @@ def after(trail, ticks):
 
 @pytest.mark.parametrize("diffusion", [0.0, 1e-9])
 def test_linear_evaporation(diffusion):
-    trail = Trail(plain_world(level=3), Pheromone(diffusion=diffusion))
+    trail = trail_of(plain_world(level=3), Pheromone(diffusion=diffusion))
     levels = []
     for _ in range(5):
         levels.append(float(trail.level(MIDDLE)))
@@ -39,7 +43,7 @@ def test_linear_evaporation(diffusion):
 @pytest.mark.parametrize("half_life", [1, 7.5, 50])
 def test_exponential_evaporation_halves(half_life):
     pheromone = Pheromone("exponential", half_life)
-    trail = Trail(plain_world(level=2**20), pheromone)
+    trail = trail_of(plain_world(level=2**20), pheromone)
     for ticks in range(1, 61):
         trail.tick()
         expected = 2**20 * 0.5 ** (ticks / half_life)
@@ -51,7 +55,7 @@ def test_exponential_evaporation_halves(half_life):
 
 
 def test_what_falls_below_one_is_gone():
-    trail = Trail(plain_world(level=8), Pheromone("exponential", half_life=1))
+    trail = trail_of(plain_world(level=8), Pheromone("exponential", half_life=1))
     levels = []
     for _ in range(5):
         levels.append(float(trail.level(MIDDLE)))
@@ -64,7 +68,7 @@ def test_one_tick_of_diffusion_by_hand():
     # to each of five neighbours; the sixth stays.
     rock = neighbour(MIDDLE, 0)
     world = plain_world(level=768, obstacles=[rock])
-    trail = after(Trail(world, Pheromone("none", diffusion=0.75)), 1)
+    trail = after(trail_of(world, Pheromone("none", diffusion=0.75)), 1)
     assert float(trail.level(MIDDLE)) == 768 - 5 * 96
     assert [float(trail.level(neighbour(MIDDLE, h))) for h in range(6)] == [0, 96, 96, 96, 96, 96]
     assert float(trail.level(neighbour(neighbour(MIDDLE, 2), 2))) == 0
@@ -132,7 +136,7 @@ def test_dense_levels_are_seen_from_one_on_and_from_half_of_the_strongest():
     ):
         for heading, level in enumerate(levels):
             trail = colony.world.trail
-            trail._levels[trail._place[neighbour(MIDDLE, heading)]] = level
+            trail._levels[trail._index[neighbour(MIDDLE, heading)]] = level
         act(colony, GIVE)
         assert colony.ants[0].state == state
 

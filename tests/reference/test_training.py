@@ -33,7 +33,7 @@ def prepared(learning, task=None, rng_state=0):
     q_values = np.zeros((128, 5), np.float32)
     q_values[12, PICK_UP], q_values[76, GIVE], q_values[4, 1] = 1, 2, 4
     run = train(TWO_STEPS, learning, 0, 0, 600, task)
-    run.colony.learners.tables[0] = LEARNERS[learning.learner](learning, 128, q_values)
+    run.colony.learners[0] = LEARNERS[learning.learner](learning, 128, q_values)
     run.colony.streams[0].state = rng_state
     return run
 

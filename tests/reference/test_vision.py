@@ -18,7 +18,7 @@ import pytest
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.observations import cells_in_view, observe
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task import Pheromone
+from taichi_ants.task import Pheromone, Task
 from taichi_ants.worlds.world import World
 
 A, L, M, R = (0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)
@@ -27,7 +27,7 @@ FAR = (0, 0, 4)  # a queen behind the ant, at distance 4; from L 5, from M 5, fr
 
 def sees(carries=False, cell=A, heading=1, queen=FAR, **contents) -> int:
     world = World((5, 5, 5), queen, **contents)
-    return observe(WorldState(world, Pheromone()), Ant(cell, heading, carries))
+    return observe(WorldState(world, Task()), Ant(cell, heading, carries))
 
 
 def test_the_view_is_left_forward_right():
@@ -114,7 +114,7 @@ def test_with_food(queen, state):
 @pytest.mark.parametrize("diffusion", [0.0, 1e-9])
 def test_which_trails_look_like_one(view, levels, loads, state, diffusion):
     world = World((5, 5, 5), FAR, trails=list(zip((L, M, R), levels, strict=True)))
-    moving = WorldState(world, Pheromone(view=view, diffusion=diffusion))
+    moving = WorldState(world, Task(pheromone=Pheromone(view=view, diffusion=diffusion)))
     for cell, load in zip((L, M, R), loads, strict=True):
         if load != "-":
             moving.ants[cell] = Ant(cell, 0, load == "1")

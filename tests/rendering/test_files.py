@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import weakref
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -41,31 +40,28 @@ def leftovers(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.rglob("*"))
 
 
-def test_gif(tmp_path, frames) -> None:
-    save_animation(tmp_path / "a.gif", frames, 8)
+def test_a_gif_has_all_frames_and_stores_only_changes(tmp_path, frames) -> None:
+    save_animation(tmp_path / "a.gif", iter(frames), 8)
     pictures, durations = decoded(tmp_path / "a.gif")
-    assert len(pictures) == len(frames)
     for picture, frame in zip(pictures, frames, strict=True):
         error = np.abs(picture.astype(int) - frame)
         assert error.mean() < 0.6
         assert np.percentile(error, 99.9) < 24
-    # 8 frames a second take 12.5 hundredths each: 12 and 13 in turn.
+    # 8 frames per second take 12.5 hundredths each: 12 and 13 in turn.
     assert sum(durations) == pytest.approx(len(frames) * 125, abs=10)
     assert set(durations) == {120, 130}
-    save_animation(tmp_path / "b.gif", iter(frames), 8)
-    assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "b.gif").read_bytes()
-    # Only what changes is stored: the first picture alone takes a good part of the file.
+    # The first picture alone takes a good part of the file.
     save_animation(tmp_path / "first.gif", frames[:1], 8)
     assert (tmp_path / "a.gif").stat().st_size < 6 * (tmp_path / "first.gif").stat().st_size
 
 
 def test_a_gif_keeps_the_colours_of_the_legend(tmp_path, frames) -> None:
     """All nests, kinds of food and fields, also those that the first frame lacks."""
+    fields = [colours.field_ramp(number)[-1] for number in range(colours.N_FIELDS)]
     words = np.concatenate(
         [
             *(colours.QUEENS, colours.ANTS, colours.FOODS),
-            *(colours.QUEEN_FLOORS, colours.FOOD_FLOORS),
-            [colours.field_ramp(number)[-1] for number in range(colours.N_FIELDS)],
+            *(colours.QUEEN_FLOORS, colours.FOOD_FLOORS, fields),
             [colours.CELL_EMPTY, colours.CELL_OBSTACLE, colours.INK],
         ]
     )
@@ -95,10 +91,8 @@ def test_frames_may_be_drawn_into_one_array_and_a_single_pixel_may_change(tmp_pa
             frame[row, 33] = (0x14, 0x17, 0x1C)  # an ant's
             yield frame
 
-    for name, shown in (("one", drawn()), ("several", map(np.copy, drawn()))):
-        save_animation(tmp_path / f"{name}.gif", shown, 8)
-    assert (tmp_path / "one.gif").read_bytes() == (tmp_path / "several.gif").read_bytes()
-    pictures, _ = decoded(tmp_path / "one.gif")
+    save_animation(tmp_path / "a.gif", drawn(), 8)
+    pictures, _ = decoded(tmp_path / "a.gif")
     assert all((a == b).all() for a, b in zip(pictures, drawn(), strict=True))
 
 
@@ -110,7 +104,6 @@ def test_mp4(tmp_path, frames) -> None:
         stream = container.streams.video[0]
         assert float(stream.average_rate) == pytest.approx(12.5)
         pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
-    assert len(pictures) == len(odd)
     for picture, frame in zip(pictures, odd, strict=True):
         assert picture.shape == (324, 328, 3)
         # Edges lose some colour; the large patches must not.
@@ -124,111 +117,63 @@ def test_mp4(tmp_path, frames) -> None:
         assert np.median(error[bright], axis=0).max() <= 8
 
 
-def test_numbered_pictures_and_one_picture(tmp_path, frames) -> None:
-    folder = tmp_path / "new" / "frames"
-    save_animation(folder, iter(frames[:3]), 8)
-    assert leftovers(folder) == ["frame_000000.png", "frame_000001.png", "frame_000002.png"]
-    assert (np.asarray(Image.open(folder / "frame_000002.png")) == frames[2]).all()
-    (tmp_path / "empty").mkdir()
-    save_animation(tmp_path / "empty", frames[:1], 8)
-    assert leftovers(tmp_path / "empty") == ["frame_000000.png"]
-    save_picture(tmp_path / "a.png", frames[0])
-    assert (np.asarray(Image.open(tmp_path / "a.png")) == frames[0]).all()
+def test_a_picture_has_the_pixels_of_its_frame(tmp_path, frames) -> None:
+    save_picture(tmp_path / "new" / "a.png", frames[0])
+    assert (np.asarray(Image.open(tmp_path / "new" / "a.png")) == frames[0]).all()
     with pytest.raises(AntsError, match=r"\.png"):
         save_picture(tmp_path / "a.jpg", frames[0])
 
 
-class Watched(np.ndarray):
-    """A frame of which one can ask whether anybody still has it."""
-
-    __hash__ = object.__hash__
-
-
-@pytest.mark.parametrize("name", ["a.gif", "a.mp4", "frames"])
-def test_frames_are_forgotten_once_they_are_written(tmp_path, frames, name) -> None:
-    """So that drawn frames take no memory; a GIF holds a byte for each pixel."""
+@pytest.mark.parametrize("name", ["a.gif", "a.mp4"])
+def test_a_failure_leaves_nothing_behind_and_old_files_alone(tmp_path, frames, name) -> None:
     if name == "a.mp4":
         pytest.importorskip("av")
-    held: weakref.WeakSet[Watched] = weakref.WeakSet()
-    kept = []
-
-    def drawn() -> Iterator[np.ndarray]:
-        for number in range(30):
-            frame = frames[number % len(frames)][:60, :60].copy().view(Watched)
-            held.add(frame)
-            yield frame
-            del frame
-        kept.append(len(held))
-
-    save_animation(tmp_path / name, drawn(), 8)
-    assert kept[0] <= 2
-
-
-@pytest.mark.parametrize("name", ["a.gif", "a.mp4", "frames"])
-@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-def test_a_failure_leaves_nothing_behind_and_old_files_alone(tmp_path, frames, name, error) -> None:
-    if name == "a.mp4":
-        pytest.importorskip("av")
-    (tmp_path / "old.gif").write_bytes(b"old")
+    (tmp_path / f"old{name}").write_bytes(b"old")
 
     def failing() -> Iterator[np.ndarray]:
         yield from frames[:4]
-        raise error
+        raise KeyboardInterrupt
 
-    for path in (tmp_path / "sub" / name, tmp_path / "old.gif"):
-        with pytest.raises(error):
+    for path in (tmp_path / "sub" / name, tmp_path / f"old{name}"):
+        with pytest.raises(KeyboardInterrupt):
             save_animation(path, failing(), 8)
-    assert leftovers(tmp_path) == ["old.gif"]
-    assert (tmp_path / "old.gif").read_bytes() == b"old"
+    assert leftovers(tmp_path) == [f"old{name}"]
+    assert (tmp_path / f"old{name}").read_bytes() == b"old"
 
 
-@pytest.mark.parametrize("name", ["a.gif", "new/frames"])
-def test_a_disk_that_is_full_is_told_of_the_file(tmp_path, frames, monkeypatch, name) -> None:
+def test_a_full_disk_is_reported_with_the_file(tmp_path, frames, monkeypatch) -> None:
     def full(*given: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(AntsError, match=f"cannot write .*{name}.*: no space left on device"):
-        save_animation(tmp_path / name, frames)
+    with pytest.raises(AntsError, match=r"cannot write .*a\.gif.*: no space left on device"):
+        save_animation(tmp_path / "a.gif", frames)
     assert not list(tmp_path.iterdir())
 
 
 REFUSED = {
-    **{name: ({"path": name}, r"\.gif or \.mp4") for name in ("a.avi", "a.png", "a.gif.zip")},
+    **{name: ({"path": name}, r"\.gif or \.mp4") for name in ("a.avi", "a.png", "frames")},
     **{f"fps {one}": ({"fps": one}, "fps") for one in (0, 51, float("nan"), True, "8")},
-    **{f"pause {one}": ({"pause": one}, "pause") for one in (None, -1, 61, float("nan"))},
     "no frames": ({"frames": []}, "frames is empty"),
     "no iterable": ({"frames": 7}, "frames is 7"),
-    "floats": ({"frames": [np.zeros((9, 9, 3))]}, "a frame is float64"),
-    "no channels": (
-        {"frames": [np.zeros((9, 9), np.uint8)]},
-        r"must be uint8 \(height, width, 3\)",
-    ),
-    "shapes": ({"frames": [np.zeros((n, 9, 3), np.uint8) for n in (9, 8)]}, "frame 1 has shape"),
+    "no array": ({"frames": [7]}, "a frame is 7"),
+    "floats": ({"frames": [np.zeros((9, 9, 3))]}, "frame 0 is float64"),
+    "no channels": ({"frames": [np.zeros((9, 9), np.uint8)]}, r"uint8 \(height, width, 3\)"),
+    "shapes": ({"frames": [np.zeros((n, 9, 3), np.uint8) for n in (9, 8)]}, "frame 1 is uint8"),
     "a device": ({"path": "/dev/null/a.gif"}, "cannot write"),
-    "a long name": ({"path": "n" * 300}, "cannot write"),
-    **{
-        place: ({"path": place}, "is not an empty folder; choose a new folder")
-        for place in ("link", "dangling", "full", "file", ".", "..")
-    },
+    "a long name": ({"path": "n" * 300 + ".gif"}, "cannot write"),
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_refused_leaves_nothing_behind(tmp_path, monkeypatch, name) -> None:
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "mine").touch()
-    (tmp_path / "file").touch()
-    (tmp_path / "link").symlink_to(tmp_path / "empty")
-    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
     monkeypatch.chdir(tmp_path)
-    before, (changed, message) = leftovers(tmp_path), REFUSED[name]
+    changed, message = REFUSED[name]
     with pytest.raises(AntsError, match=message):
         save_animation(
             **{"path": "new/a.gif", "frames": [np.zeros((9, 9, 3), np.uint8)], **changed}
         )
-    assert leftovers(tmp_path) == before
+    assert leftovers(tmp_path) == []
 
 
 def test_a_missing_pyav_is_named_and_a_check_leaves_no_folder(tmp_path, monkeypatch) -> None:

@@ -6,9 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
+from plain_runs import follower
 from random_worlds import random_world
 
-from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, reference, rollout
+from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, rollout
 from taichi_ants.grid.hexgrid import normal_form
 from taichi_ants.grid.randomness import GAMMA
 from taichi_ants.learners.policies import random_policy, trail_follower
@@ -44,7 +45,7 @@ def check(world: World, seed: int, evaporation: bool, epsilon: float) -> int:
     snapshots = list(episode.snapshots())
     assert len(snapshots) == len(trace) + 1
 
-    colony = reference.follower(world, table, seed, 0, task, epsilon)
+    colony = follower(world, table, seed, 0, task, epsilon)
     colony.begin_episode()
     existing = list(colony.world.ground)
     index = world.grid.index(np.array(existing))

@@ -17,15 +17,10 @@ from PIL import Image
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 
 
-def chromium() -> str | None:
-    """Return the path of the browser: the variable CHROMIUM, or a command on the PATH."""
-    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, _NAMES)), None)
-
-
 @contextmanager
 def started() -> Iterator[Any]:
-    """Yield a browser of Playwright; skip the test if there is none."""
-    path = chromium()
+    """Yield a browser: the variable CHROMIUM, or a command on the PATH; without, skip the test."""
+    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, _NAMES)), None)
     if path is None:
         pytest.skip("there is no Chromium here; install the package chromium")
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -113,19 +108,3 @@ class Page:
     def close(self) -> None:
         self.context.close()
         assert not self.faults
-
-
-def assert_policy_holds(browser: Any, path: Path) -> None:
-    """The page in a file runs its own script, and no script that somebody has added to it."""
-    evil = path.with_name("evil.html")
-    added = "<script>document.title = 'evil'</script></main>"
-    evil.write_text(path.read_text(encoding="utf-8").replace("</main>", added), encoding="utf-8")
-    for file, refused in ((path, 0), (evil, 1)):
-        faults, context = [], browser.new_context(offline=True)
-        tab = context.new_page()
-        tab.on("console", lambda message, faults=faults: faults.append(message.text))
-        tab.goto(file.as_uri())
-        tab.locator("#now dd").first.wait_for()
-        assert tab.title() != "evil"
-        context.close()
-        assert len(faults) == refused

@@ -83,29 +83,29 @@ def load(name: str) -> ModuleType:
     return importlib.import_module(name if name in STUDIES else f"taichi_ants.commands.{name}")
 
 
-Outcome = tuple[int, str, str]
-
-
-def call(name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[str]) -> Outcome:
+def call(
+    name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[str]
+) -> tuple[int, str, str]:
     """Return exit status, standard output and standard error of a command run in this process."""
-    capsys.readouterr()
-    with pytest.raises(SystemExit) as exit_:
-        load(name).main([str(argument) for argument in arguments])
-    written = capsys.readouterr()
-    return exit_.value.code, written.out, written.err
+    return _ended(lambda: load(name).main([*map(str, arguments)]), capsys)
 
 
 def call_script(
     name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[str]
-) -> Outcome:
+) -> tuple[int, str, str]:
     """Return the outcome of a script of `experiments/` run in this process."""
-    capsys.readouterr()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", [f"{name}.py", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exit_:
-            runpy.run_path(str(EXPERIMENTS / f"{name}.py"), run_name="__main__")
+        script = str(EXPERIMENTS / f"{name}.py")
+        return _ended(lambda: runpy.run_path(script, run_name="__main__"), capsys)
+
+
+def _ended(work: Callable[[], object], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as ended:
+        work()
     written = capsys.readouterr()
-    return exit_.value.code, written.out, written.err
+    return ended.value.code, written.out, written.err
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -147,6 +147,3 @@ def assert_one_sentence(stderr: str) -> None:
     assert stderr.startswith("error: ")
     assert stderr.endswith(".\n")
     assert stderr.count("\n") == 1
-
-
-Caller = Callable[[Sequence[object]], Outcome]

@@ -9,6 +9,7 @@ import numpy as np
 from colony import colony_page
 from colony_figures import draw_all as draw_study
 from colony_findings import Results as StudyResults
+from paper.baselines import Baseline
 from paper.claims import Audit, assess
 from paper.comparison import DYNA_P5, Comparison
 from paper.figures import for_page
@@ -17,13 +18,11 @@ from paper.table2 import Line, summarise, table2
 from synthetic_colony_study import build as build_study
 from synthetic_comparison import build, change, unchanged
 
-from taichi_ants import Colony, Task, TrainingConfig, worlds
-from taichi_ants.analysis.bounds.baselines import Baseline
+from taichi_ants import Colony, Task, TrainingConfig, rollout, worlds
 from taichi_ants.analysis.drawings import drawings
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.rendering import Episode
 from taichi_ants.report.page import Picture, Player
-from taichi_ants.viewer import record_colony, record_episode
+from taichi_ants.viewer import record_colony, record_trace
 
 FACTS = {"World": "the <paper's>", "Command": "compare.py --out 'a & b'"}
 BASELINES = [Baseline("shortest delivery", None, 45.0, 34.0, 1.0)]
@@ -52,7 +51,7 @@ def results() -> Results:
 @cache
 def comparison_html() -> str:
     """Return the page of `results`."""
-    recording = record_episode(Episode.play(worlds.paper(), trail_follower()))
+    recording = record_trace(rollout(worlds.paper(), trail_follower()))
     sheet = Picture("a <policy>", np.full((20, 30, 3), 200, np.uint8))
     comparison, lines, audit = results()
     return comparison_page(

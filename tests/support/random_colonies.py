@@ -1,4 +1,8 @@
-"""Random colonies: small crowded worlds with all options, learners and ways of sharing."""
+"""Random colonies: small crowded worlds with all options, learners and ways of sharing.
+
+Golden hashes belong to these draws, so that nothing is drawn in another order or range. What is new
+is drawn from a stream of its own.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +21,12 @@ from taichi_ants.worlds import World
 from taichi_ants.worlds.world import STARTS
 
 LEARNERS = ("q_learning", "sarsa", "expected_sarsa", "dyna_q")  # ants can share their tables
+HYPERPARAMETERS: dict[str, dict[str, Any]] = {
+    "dyna_q": {"planning_steps": 2},
+    "n_step_sarsa": {"n_steps": 3},
+    "sarsa_lambda": {"trace_decay": 0.9},
+    "prioritized_sweeping": {"planning_steps": 3, "threshold": 0.1},
+}
 
 
 @dataclass(frozen=True)
@@ -30,6 +40,16 @@ class RandomColony:
     seed: int
     sharing: str
     q_values: np.ndarray | None
+
+    @property
+    def model(self) -> tuple[World, Task, TrainingConfig | None, int]:
+        """The arguments by position."""
+        return self.world, self.task, self.training, self.seed
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The arguments by name."""
+        return {**self.population, "sharing": self.sharing, "q_values": self.q_values}
 
 
 def random_colony(
@@ -61,18 +81,21 @@ def random_colony(
     "deneubourg" have no training, so their `sharing` must be "frozen". With a compass, those with
     food follow the last field, if there is one.
     """
-    rng = np.random.default_rng([seed, 2])
+    rng, choices = np.random.default_rng([seed, 2]), np.random.default_rng([seed, 1])
     world = random_world(seed, largest_range)
     room = int(np.count_nonzero(world.ground() == EMPTY))
-    sharing = str(rng.choice(SHARINGS)) if sharing is None else sharing
     population, task = _rules(rng, min(room, most_ants), dense, changes)
-    training, delivery = _training(rng, learner)
-    given = sharing == "frozen" or rng.random() < 0.6
+    may_end = population["ants"] == 1 and not task.life.births
+    population["ends_at_delivery"] = may_end and bool(choices.random() < 0.5)
+    sharing = sharing or str(choices.choice(SHARINGS))
+    training = random_training(rng, learner or str(choices.choice(LEARNERS)))
+    delivery = str(rng.choice(["terminates", "truncates"]))
+    has_table = sharing == "frozen" or rng.random() < 0.6
     chooses = random_choice(seed, choice)
     if fields and choice == "deneubourg" and cues[1] == "compass":
         chooses = chooses.replace(carriers_follow=fields[-1])
     if not chooses.needs_table:
-        training, given = None, False
+        training, has_table = None, False
     return RandomColony(
         world=world,
         task=replace(
@@ -93,7 +116,7 @@ def random_colony(
         training=training,
         seed=int(rng.integers(-5, 2**40)),
         sharing=sharing,
-        q_values=forager(observation) if given else None,
+        q_values=forager(observation) if has_table else None,
     )
 
 
@@ -153,7 +176,7 @@ def _rules(
     ants = int(rng.choice([1, rng.integers(1, most_ants + 1), most_ants]))
     births = bool(rng.random() < 0.5)
     capacity = ants + int(rng.integers(0, 6)) if rng.random() < 0.5 else None
-    pheromone = _pheromone(rng, dense)
+    pheromone = random_pheromone(rng, dense)
     lifespan = int(rng.integers(1, 30)) if rng.random() < 0.5 else None
     regrowth = int(rng.choice([0, 0, 1, 2, 7])) if rng.random() < 0.7 else None
     pile_move_interval = int(rng.choice([1, 2, 5])) if rng.random() < 0.5 else None
@@ -161,17 +184,17 @@ def _rules(
         lifespan = 9
     if changes and regrowth is None and pile_move_interval is None:
         pile_move_interval = 3
-    ends = ants == 1 and not births and bool(rng.random() < 0.5)
     start = str(rng.choice(STARTS))
     task = Task(
         pheromone=pheromone,
         evaporation_in_training=True,
         life=Life(births, lifespan, regrowth, pile_move_interval),
     )
-    return {"ants": ants, "capacity": capacity, "ends_at_delivery": ends, "start": start}, task
+    return {"ants": ants, "capacity": capacity, "start": start}, task
 
 
-def _pheromone(rng: np.random.Generator, dense: bool | None) -> Pheromone:
+def random_pheromone(rng: np.random.Generator, dense: bool | None) -> Pheromone:
+    """Return a pheromone; a dense one has real numbers as levels."""
     evaporation = str(rng.choice(["linear", "exponential", "none"]))
     half_life = float(rng.choice([0.5, 3.0, 50.0]))
     diffusion = float(rng.choice([0.0, 0.0, 0.05, 0.6, 1.0]))
@@ -195,28 +218,24 @@ def _pheromone(rng: np.random.Generator, dense: bool | None) -> Pheromone:
 def _field(seed: int, name: str, view: str) -> Field:
     """Return a random field, which is dense if its name is a capital."""
     rng = np.random.default_rng([seed, 4, ord(name)])
-    rules = vars(_pheromone(rng, name.isupper()))
+    rules = vars(random_pheromone(rng, name.isupper()))
     laid = rng.choice(["with_food", "without_food", "always", "dead_end", "failed_pick_up"])
-    laid = laid if rng.random() < 0.9 else "never"
     if name in "cC":  # so that two cues have different views
         view = "strongest" if view == "half" else "half"
     return Field(**{**rules, "view": view, "deposited_when": str(laid)})
 
 
-def _training(rng: np.random.Generator, learner: str | None) -> tuple[TrainingConfig, str]:
-    """Return a random training configuration, with extreme values, and a random `delivery`."""
-    drawn = LEARNERS[rng.integers(len(LEARNERS))]
-    learner = drawn if learner is None else learner
-    config = TrainingConfig(
+def random_training(rng: np.random.Generator, learner: str) -> TrainingConfig:
+    """Return a configuration with extreme values."""
+    return TrainingConfig(
         learner=learner,
-        learning_rate=float(rng.choice([0.001, 0.01, 0.37, 1.0])),
+        learning_rate=float(rng.choice([0.01, 0.37, 1.0])),
         discount=float(rng.choice([0.0, 0.9, 0.99])),
         epsilon=float(rng.choice([0.0, 0.05, 0.3, 1.0])),
         epsilon_decay=float(rng.choice([0.3, 0.99, 1.0])),
         min_epsilon=float(rng.choice([0.0, 0.01, 0.2])),
-        hyperparameters={"planning_steps": 2} if learner == "dyna_q" else {},
+        hyperparameters=HYPERPARAMETERS.get(learner, {}),
         learning_rate_decay=float(rng.choice([0.5, 0.9, 1.0])),
         min_learning_rate=float(rng.choice([0.0, 0.1])),
         initial_q=float(rng.choice([0.0, 0.0, 1.7, -3.0])),
     )
-    return config, str(rng.choice(["terminates", "truncates"]))

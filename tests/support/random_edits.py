@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.live import edits
-from taichi_ants.reference.geometry import Cell
 from taichi_ants.reference.interventions import Interventions as PlainInterventions
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
+from taichi_ants.task.constants import EMPTY
 
 KINDS = (
     *("place", "place", "place", "clear", "trail", "add_ants", "remove_ants", "queen"),
@@ -56,36 +56,8 @@ def apply_to_both(
     edit: dict[str, Any], interventions: Interventions, plain: PlainInterventions
 ) -> None:
     """Apply an edit to a colony and to its twin; raises AntsError if the world forbids it."""
-    grid = interventions.colony.grid
-    edits.checked(edit, interventions).apply(interventions)
-    ((kind, settings),) = edit.items()
-    cells: list[Cell] = []
-    for cell in dict.fromkeys(settings.get("cells", ()) if isinstance(settings, dict) else ()):
-        x, y, z = grid.cells(cell).tolist()
-        cells.append((x, y, z))
-    if kind == "clear":
-        plain.put(cells, EMPTY)
-    elif kind == "place" and settings["what"] == "queen":
-        plain.move_queen(*cells)
-    elif kind == "place":
-        plain.put(cells, {"rock": OBSTACLE, "food": FOOD}[settings["what"]])
-    elif kind == "trail":
-        plain.lay_trail(cells, settings["level"])
-    elif kind == "add_ants":
-        plain.add_ants(cells, settings["heading"])
-    elif kind == "remove_ants":
-        plain.remove_ants(cells)
-    elif kind == "episode":
-        plain.begin_episode()
-    elif kind == "task":
-        _set_task(settings, plain)
-    else:
-        getattr(plain, f"set_{kind}")(settings)
-
-
-def _set_task(settings: dict[str, Any], plain: PlainInterventions) -> None:
-    for name, value in settings.items():
-        if name in ("evaporation_in_training", "evaporation_in_evaluation"):
-            plain.set_evaporation(value)
-        elif name != "pheromone.evaporation":  # set_evaporation has set it
-            plain.set_pheromone(**{name.removeprefix("pheromone."): value})
+    change: Any = edits.checked(edit, interventions)
+    interventions.apply(change)
+    if getattr(change, "cells", None):
+        change = replace(change, cells=interventions.colony.grid.cells(change.cells).tolist())
+    plain.apply(change)

@@ -49,11 +49,9 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
         assert arrays["loads"][at].tolist() == loads
     levels = np.array([plain.world.trail.level(cell) for cell in plain.world.ground])
     assert np.array_equal(ours.trail[places], levels.astype(ours.trail.dtype))
-    assert list(ours.fields) == ["trail", *plain.world.fields]
+    assert list(ours.fields) == [*plain.world.pheromones]
     for name, field in ours.fields.items():
-        levels = np.array(
-            [plain.world.pheromone_named(name).level(cell) for cell in plain.world.ground]
-        )
+        levels = np.array([plain.world.pheromones[name].level(cell) for cell in plain.world.ground])
         assert np.array_equal(field[places], levels.astype(field.dtype)), name
     assert np.array_equal(colony.q_values[world], plain.q_values)
     assert int(arrays["queen_streams"][world]) == plain.queen_stream.state
@@ -85,4 +83,4 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     assert cells == [list(source.cell) for source in theirs]
     assert food_sources[FoodSourceRow.KIND].tolist() == [source.kind for source in theirs]
     if colony.sharing == "shared" and colony.training.learner == "dyna_q":
-        assert colony.arrays["integers"][0] == len(plain.learners.tables[0].model)
+        assert colony.arrays["integers"][0] == len(plain.learners[0].model)

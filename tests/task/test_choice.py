@@ -117,7 +117,7 @@ def test_a_task_without_noise_draws_nothing():
 
 
 CELLS = Task(choice="deneubourg")
-GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
+GIVEN = Arguments("paper", 9, "index", None)  # to environments
 REFUSED = [
     (lambda: Choice("greedy", temperature=2.0), "`task.choice.temperature` is 2.0; leave it out"),
     (lambda: Noise(slip=1.5), "`task.noise.slip` is 1.5; it must be between 0 and 1."),

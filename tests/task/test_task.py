@@ -64,8 +64,9 @@ def always_zero(view):
         ({"cells": (0, 1)}, r"cells of 'mine' is \(0, 1\); it must be a tuple of -1, 0, 1"),
         ({"name_of": int}, "name_of fails .the name of state 0 is 0; it must be text.;"),
         ({"cells": (-1, 0, 1, 4)}, "optionally -2, 2 and 3"),
-        ({"reads": ("a", "a")}, "reads of 'mine' contains 'a'; it must contain names of fields"),
-        ({"reads": ("level",)}, "reads of 'mine' contains 'level'; it must contain names of"),
+        ({"reads": ("a", "a")}, r"reads of 'mine' is \('a', 'a'\); it must be a tuple of names"),
+        ({"reads": ("level",)}, r"reads of 'mine' is \('level',\); it must be a tuple of names"),
+        ({"shape": (2, 2)}, r"shape of 'mine' is \(2, 2\); it must be a tuple of .*n_states, 1;"),
     ],
 )
 @pytest.mark.usefixtures("_no_observation_stays")

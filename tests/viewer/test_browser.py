@@ -17,7 +17,7 @@ from taichi_ants.rendering import Episode
 from taichi_ants.task import Life, Pheromone
 from taichi_ants.task.constants import ACTION_NAMES
 from taichi_ants.task.events import Event
-from taichi_ants.viewer import Recording, page, record_colony, record_episode
+from taichi_ants.viewer import Recording, page, record_colony, record_trace
 from taichi_ants.viewer.page import SCRIPTS, part
 
 pytestmark = pytest.mark.browser
@@ -46,7 +46,7 @@ def written(folder, name: str, recording: Recording):
 def episode(folder):
     """The paper's, and its trace."""
     one = Episode.play(worlds.paper(), trail_follower())
-    return written(folder, "episode", record_episode(one, "the paper's ant")), one.trace
+    return written(folder, "episode", record_trace(one.trace, "the paper's ant")), one.trace
 
 
 @pytest.fixture(scope="module")

@@ -66,7 +66,7 @@ def test_frames_have_castes_kinds_of_food_and_rewards(sharing):
         seen |= {("idle", one) for one in idle.tolist()}
         if tick == 70:
             (cell,) = colony.grid.cells(np.array([snapshot.ant_cells[0]])).tolist()
-            Place("food", [cell], kind="egg").apply(Interventions(colony))
+            Interventions(colony).apply(Place("food", [cell], kind="egg"))
             frame = unpack(recorder.types, recorder.snapshot())
     assert {("carried", kind) for kind in (-1, 0, 1, 2)} <= seen
     assert {("reward", 90.0), ("reward", 40.0), ("idle", True), ("idle", False)} <= seen

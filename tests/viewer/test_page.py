@@ -17,7 +17,7 @@ from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import Episode, colours
 from taichi_ants.task import Caste, Food, Task
-from taichi_ants.viewer import record_colony, record_episode
+from taichi_ants.viewer import record_colony, record_trace
 from taichi_ants.viewer.page import part
 
 TITLE = 'An <ant> & its "trail"'
@@ -25,7 +25,7 @@ TITLE = 'An <ant> & its "trail"'
 
 @pytest.fixture(scope="module")
 def episode():
-    return record_episode(Episode.play(worlds.paper(), trail_follower()), TITLE)
+    return record_trace(Episode.play(worlds.paper(), trail_follower()).trace, TITLE)
 
 
 def test_light_colours_are_those_of_the_pictures():

@@ -28,7 +28,6 @@ from taichi_ants.viewer import (
     Recorder,
     Recording,
     record_colony,
-    record_episode,
     record_trace,
 )
 from taichi_ants.viewer.frames import types_of
@@ -119,7 +118,7 @@ def test_a_recording_of_several_nests(sharing):
     for tick in range(30):
         queens.append(colony.snapshot().queens.tolist())
         if tick == 9:
-            Place("queen", [[0, 6, 0]], nest=1).apply(Interventions(colony))
+            Interventions(colony).apply(Place("queen", [[0, 6, 0]], nest=1))
             frames.append(recorder.snapshot())
             queens.append(colony.snapshot().queens.tolist())
         frames.append(recorder.tick())
@@ -219,8 +218,6 @@ def test_what_cannot_be_recorded_says_why():
         record_colony(colony, -1)
     with pytest.raises(AntsError, match="follow is 3; it must be from 0 to 0"):
         record_colony(colony, 1, follow=3)
-    with pytest.raises(AntsError, match="episode is None"):
-        record_episode(None)
     trace = rollout(worlds.paper(), trail_follower())
     object.__setattr__(trace, "arguments", None)
     with pytest.raises(AntsError, match="does not contain its world and settings"):

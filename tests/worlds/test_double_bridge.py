@@ -10,7 +10,7 @@ import pytest
 from taichi_ants.errors import AntsError
 from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, neighbour
 from taichi_ants.worlds import World
-from taichi_ants.worlds.double_bridge import branch_cells, double_bridge, junction_cells
+from taichi_ants.worlds.double_bridge import bridge_paths, double_bridge
 
 LENGTHS = [(23, 36), (23, 23), (23, 43), (4, 4), (4, 5), (5, 7), (10, 13), (30, 56)]
 
@@ -45,8 +45,9 @@ ASIDE = [*((*one, 0) for one in LENGTHS), (23, 36, 1), (23, 23, 1), (23, 40, 3),
 @pytest.mark.parametrize(("short", "long", "aside"), ASIDE)
 def test_branches_are_as_long_as_asked_for(short: int, long: int, aside: int, flip: bool) -> None:
     cells = walkable(double_bridge(short, long, flip, aside))
-    nest, food = listed_cells(junction_cells(short, long, flip, aside))
-    branches = [set(listed_cells(one)) for one in branch_cells(short, long, flip, aside)]
+    junctions, paths = bridge_paths(short, long, flip, aside)
+    nest, food = listed_cells(junctions)
+    branches = [set(listed_cells(cells)) for cells in paths]
     assert branches[0] | branches[1] < cells
     assert not branches[0] & branches[1]
     for closed, length in zip(reversed(branches), (short, long), strict=True):
@@ -84,16 +85,15 @@ def test_the_way_to_the_food_and_who_starts_where() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("settings", "message"),
     [
         ({"long": 22}, "`world.long` is 22; .* it must be between 23 and 43"),
         ({"long": 44}, "`world.long` is 44; with `short` 23"),
         ({"long": 43, "aside": 1}, "`world.long` is 43; with `short` 23 and `aside` 1"),
-        ({"aside": 20}, "`world.aside` is 20; with `short` 23 it must be at most 19"),
+        ({"aside": 20}, "`world.aside` is 20; with .* it must be between 0 and 19"),
         ({"mirrored": 1}, "`world.mirrored` is 1; it must be True or False"),
     ],
 )
-def test_errors_name_what_is_wrong(given: dict, message: str) -> None:
-    for build in (double_bridge, branch_cells):
-        with pytest.raises(AntsError, match=message):
-            build(**given)
+def test_errors_name_what_is_wrong(settings: dict, message: str) -> None:
+    with pytest.raises(AntsError, match=message):
+        double_bridge(**settings)

@@ -43,42 +43,6 @@ def test_a_text_map_draws_regions():
     assert World.from_dict(world.as_dict()) == world
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("region = %\nQ", "line 1 of the map is 'region = %'; write a name and a mark, such as"),
-        ("region a b = %\nQ", "is 'region a b = %'; write a name and a mark, such as"),
-        ("region a = Q\nQ", "has the mark 'Q', which has a meaning in maps; choose one of % [*]"),
-        ("region a = %\nregion b = %\n%", "has the mark '%', which is used already; choose one"),
-        ("region a = % z\nQ", "draws cells as 'z'; use only [.] #"),
-        ("region a = %\nQ", "has no cell '%' of the region a; draw one, or leave"),
-        ("Q\nregion a = %", "names a region; move it above the drawing"),
-        ("region a = % Q\n%\n\n%", "a second time; draw the queen of each nest once"),
-        ("region 1a = %\n%\n\nQ", "a region in line 1 of the map is '1a'; it must be a word"),
-    ],
-)
-def test_a_wrong_line_of_a_region_is_named(text, says):
-    with pytest.raises(AntsError, match=says):
-        from_text(text)
-
-
-@pytest.mark.parametrize(
-    ("regions", "says"),
-    [
-        ([1], r"^regions is \[1\]; it must be a mapping of names to values\.$"),
-        ({"a": []}, r"^regions\.a is empty; give at least one cell\.$"),
-        ({"a": {"centre": (0, 0, 0)}}, r"^regions\.a has the settings centre; give centre"),
-        ({"a": {"centre": (0, 0, 0), "radius": -1}}, r"^regions\.a\.radius is -1; it must lie"),
-        ({"a": {"centre": (50, 0, 0), "radius": 1}}, r"^regions\.a\.centre is \(50, 0, 0\), outs"),
-        ({"a": [(50, 0, 0)]}, r"^regions\.a\[0\] is \(50, 0, 0\), outside the world"),
-        ({"a": 3}, r"^regions\.a is 3; it must be a sequence of \(x, y, z\)\.$"),
-    ],
-)
-def test_a_wrong_region_is_named(regions, says):
-    with pytest.raises(AntsError, match=says):
-        worlds.paper().with_regions(regions)
-
-
 def test_interventions_take_the_regions_of_each_world(tmp_path):
     """Worlds of a colony can have different cells in a region of the same name."""
     shared = worlds.open_world(3, (6, 6, 6))

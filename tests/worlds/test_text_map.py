@@ -1,5 +1,6 @@
 """Maps in text: what they mean, what is refused, and that drawing undoes reading."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -51,21 +52,34 @@ def test_settings() -> None:
     ("text", "message"),
     [
         ("", "the map has no cells"),
-        (".\n  .", "no queen"),
-        ("Q\n  .\nQ", "line 3, column 1 of the map has 'Q' a second time"),
+        (".\n  .", "the map has no queen; draw the queen of each nest once, as Q, R, S, U in this"),
+        ("Q\n  .\nQ", "the map has the queens Q Q; draw the queen of each nest once"),
+        ("Q\n\nS", "the map has the queens Q S; draw the queen of each nest once"),
+        ("region a = % Q\n%\n\n%", "the map has the queens Q Q; draw"),
         (
             "Q\n  x",
             r"line 2, column 3 of the map has 'x'; use only \. # t, F G H I, Q R S U, 0 to 5",
         ),
         ("Q   .\n  .\n.  .", "line 3, column 4 of the map has '.', which is between two cells"),
         ("Q\n .", "of the map has '[Q.]', which is between"),
-        ("trail = -1\nQ", "line 1 of the map sets trail to '-1'; .* from 1 to 1000000000"),
-        (
-            "; c\ntrails = 3\nQ",
-            "line 2 of the map sets 'trails'; the only settings are trail and region",
+        *(
+            (text, f"line {number} of the map is '{re.escape(line)}'; above the drawing, write")
+            for text, number, line in (
+                ("trail = -1\nQ", 1, "trail = -1"),
+                ("trail = 9\ntrail = 9\nQ", 2, "trail = 9"),
+                ("; c\ntrails = 3\nQ", 2, "trails = 3"),
+                ("Q\ntrail = 3", 2, "trail = 3"),
+                ("region = %\nQ", 1, "region = %"),
+                ("region a b = %\nQ", 1, "region a b = %"),
+                ("region a = Q\nQ", 1, "region a = Q"),
+                ("region a = %\nregion b = %\n%", 2, "region b = %"),
+                ("region a = % z\nQ", 1, "region a = % z"),
+                ("Q\nregion a = %", 2, "region a = %"),
+                ("region 1a = %\n%\n\nQ", 1, "region 1a = %"),
+            )
         ),
-        ("Q\ntrail = 3", "line 2 of the map is 'trail = 3'; only one such line is allowed, above"),
-        ("Q" + " " * 200_003 + "." + "\n" * 200_000 + ".", "ranges are"),
+        ("region a = %\nQ", "regions.a is empty; give at least one cell"),
+        ("Q" + " " * 200_003 + "." + "\n" * 200_000 + ".", "ranges"),
     ],
 )
 def test_damaged_maps(text: str, message: str) -> None:

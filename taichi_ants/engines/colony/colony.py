@@ -17,7 +17,7 @@ from taichi_ants.engines.colony.stepping import Stepper
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, as_array, checked_whole, count, entries_of, shown
 from taichi_ants.measures.measure import Measure
-from taichi_ants.measures.series import Recorder
+from taichi_ants.measures.series import Recorder, stops
 from taichi_ants.protocol import ProtocolEvent
 from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
@@ -196,14 +196,13 @@ class Colony(ColonyState):
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
         places = self._checked_places(worlds, episodes)
-        arguments.check_progress(progress)
         recorder, timetable = Recorder(measures, every), Timetable(self, protocol, ticks)
         outcomes = []
         for episode in range(episodes):
             self.begin_episode(ticks, places[episode])
             recorder.begin(episode)
             with timetable:
-                for stop in recorder.stops(ticks):
+                for stop in stops(ticks, recorder.every):
                     for _ in timetable.pieces(self._stepper, stop - self.ticks):
                         if progress is not None:
                             progress((episode + self.ticks / ticks) / episodes)

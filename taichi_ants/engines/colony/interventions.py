@@ -20,9 +20,8 @@ counts the ants of that nest.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,7 +36,7 @@ from taichi_ants.engines.colony.layout import (
     WorldRow,
 )
 from taichi_ants.engines.layout import note_best_actions
-from taichi_ants.errors import AntsError, checked_whole, count, entries_of, shown
+from taichi_ants.errors import AntsError, count, entries_of, shown
 from taichi_ants.grid.constants import (
     N_HEADINGS,
     STREAM_BORN,
@@ -46,7 +45,23 @@ from taichi_ants.grid.constants import (
 )
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
-from taichi_ants.interventions import check_follows, check_learns, check_same_kernels, indices
+from taichi_ants.interventions import (
+    AddAnts,
+    Clear,
+    Episode,
+    Intervention,
+    Move,
+    Place,
+    RemoveAnts,
+    SetAnts,
+    SetEpsilon,
+    SetLearningRate,
+    SetPolicy,
+    SetTask,
+    SetTrail,
+    flat_index,
+    indices,
+)
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.task.field import TRAIL
@@ -55,10 +70,8 @@ from taichi_ants.worlds.world import World
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-Cells = np.ndarray | str  # flat indices (n,), or the name of a region
 Change = Iterator[None]  # yields once, between its checks and its effects
 REACH = 8  # cells; twice the radius of the largest brush on the live page
-
 
 _GRID = AxialGrid((REACH + 1,) * 3)
 _CELLS = _GRID.cells(np.flatnonzero(_GRID.exists))
@@ -68,61 +81,119 @@ _STEPS = axial(_CELLS[_ORDER[1:]])
 # The ground at the start of later episodes has the kind of a food, or the nest of a queen, above
 # the bits of the content.
 _CONTENT, _NUMBER = 15, 4
+_GROUNDS = {"rock": OBSTACLE, "food": FOOD}
 
 
 class _World:
     """One world of a colony with interventions; its slots, cells and arrays are of this world.
 
-    A method that returns a `Change` yields once, between its checks and its effects.
+    The methods up to `trail` have the names of interventions. A method that returns a `Change`
+    yields once, between its checks and its effects.
     """
 
     def __init__(self, interventions: Interventions, w: int) -> None:
         self.all, self.w, self.colony = interventions, w, interventions.colony
         self.rows = self.colony.arrays["worlds"][:, w]
 
-    def put(self, cells: Cells, what: int, kind: int = 0) -> Change:
+    def place(self, change: Place) -> Change:
+        """Place rock or food; see `_put` and `_move_queen`."""
+        cells, foods = self._index(change.cells), list(self.colony.task.foods)
+        if change.what == "queen":
+            return self._move_queen(int(cells[0]), change.nest or 0)
+        kind = foods.index(change.kind) if change.kind else 0
+        return self._put(cells, _GROUNDS[change.what], kind)
+
+    def clear(self, change: Clear) -> Change:
+        """Remove rock and food."""
+        return self._put(self._index(change.cells), EMPTY)
+
+    def move(self, change: Move) -> Change:
+        """Move the rock, the food or the queen of a cell to another; an ant there moves aside.
+
+        Has no effect if the first cell has none of them, or the other one is not free.
+        """
+        cell, to = (flat_index(self.colony.grid, cell) for cell in change.cells)
+        what, colony = int(self.view("ground")[cell]), self.colony
+        if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
+            yield
+        elif what == QUEEN:
+            yield from self._move_queen(to, int(np.argmax(self.queen_cells == cell)))
+        else:
+            is_food = what == FOOD
+            kind = int(self.view("kind_of")[cell]) if is_food and colony.n_kinds > 1 else 0
+            loads = int(self.view("loads")[cell]) if is_food and colony.task.has_loads else None
+            yield from self._start_with([cell, to], [EMPTY, what | kind << _NUMBER])
+            self._step_aside(*self._aside(np.array([to])))
+            self._fill(np.array([cell]), EMPTY, 0)
+            self._fill(np.array([to]), what, kind, loads)
+
+    def trail(self, change: SetTrail) -> Change:
+        """Set the trail, or a further field, of cells other than rocks."""
+        everywhere = np.flatnonzero(self.colony.grid.exists)
+        cells = everywhere if change.cells is None else self._index(change.cells)
+        number = [TRAIL, *self.colony.task.fields].index(change.field)
+        yield
+        self._lay(cells[self.view("walls")[cells] == 0], change.level, number)
+
+    def add_ants(self, change: AddAnts) -> Change:
+        """Put newborn ants on free start cells, or on those of the cells given that are empty."""
+        if change.cells is None:
+            return self._add_some(self._amount(change), change.heading, change.nest)
+        cells = self._index(change.cells)
+        distances = [self.colony.grid.distances(queen)[cells] for queen in self._queens()]
+        nests = np.argmin(distances, axis=0)
+        if change.nest is not None:
+            nests = np.full(len(cells), change.nest)
+        return self._add(cells, nests, change.heading)
+
+    def remove_ants(self, change: RemoveAnts) -> Change:
+        """Remove random ants, or those on cells, with the food that they carry."""
+        slots = self._living_slots(change.nest)
+        cells = None if change.cells is None else self._index(change.cells)
+        yield
+        if cells is None:
+            words = self.all.stream(self.w).bits(len(slots))
+            self._remove(slots[np.argsort(words, kind="stable")[: self._amount(change)]])
+        else:
+            self._remove(slots[np.isin(self.cells[slots], cells)])
+
+    def ants(self, change: SetAnts) -> Change:
+        """Set the number of ants; new ants take free cells in the order of `World.start`."""
+        n, living = change.number, self._living_slots()
+        free = int(np.count_nonzero(self.view("ground") == EMPTY))
+        room = min(self.colony.capacity, free + len(living))
+        if self.all.lasting:
+            room = min(room, int(np.count_nonzero(self.all.starts[self.w] == EMPTY)))
+        if n > room:
+            raise AntsError(f"ants is {n}, but there is room for {room}; choose fewer ants.")
+        if n >= len(living):
+            yield from self._add_some(n - len(living))
+        else:
+            yield
+            self._remove(living[n:])
+
+    # Parts of changes
+
+    def _put(self, there: np.ndarray, what: int, kind: int = 0) -> Change:
         """Make cells EMPTY, OBSTACLE or FOOD, except those of queens and of ants that stay.
 
         Rock and food move ants aside, and rocks remove trails. Food of a kind fills its cell with
         all loads. Each new food item gets a food source: it grows back, and wanders with adjacent
         food. AntsError if later episodes would have no room for the ants, or no food to learn from.
         """
-        there = self.index(cells)
         held = self.view("ground")[there]
         ants, to = self._aside(there) if what != EMPTY else (there[:0], there[:0])
         at = self.cells[ants]
         there = there[((held >> 4 == 0) | np.isin(there, at)) & (held != QUEEN)]  # see `layout`
         yield from self._start_with(there, what | kind << _NUMBER)
         self._step_aside(ants, to)
-        self._put(there, what, kind)
+        self._fill(there, what, kind)
 
-    def move(self, cell: int, to: int) -> Change:
-        """Move the rock, the food or the queen of a cell to another; an ant there moves aside.
-
-        Has no effect if the first cell has none of them, or the other one is not free.
-        """
-        what, colony = int(self.view("ground")[cell]), self.colony
-        if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
-            yield
-        elif what == QUEEN:
-            yield from self.move_queen(to, int(np.argmax(self.queen_cells == cell)))
-        else:
-            of = self.view("kind_of") if colony.n_kinds > 1 else np.zeros(cell + 1, int)
-            kind = int(of[cell]) if what == FOOD else 0
-            loads = (
-                int(self.view("loads")[cell]) if what == FOOD and colony.task.has_loads else None
-            )
-            yield from self._start_with([cell, to], [EMPTY, what | kind << _NUMBER])
-            self._step_aside(*self._aside(np.array([to])))
-            self._put(np.array([cell]), EMPTY, 0)
-            self._put(np.array([to]), what, kind, loads)
-
-    def move_queen(self, cell: int, nest: int = 0) -> Change:
+    def _move_queen(self, cell: int, nest: int) -> Change:
         """Move the queen of a nest to a cell without rock or food; an ant there moves aside.
 
-        AntsError if the cell is not free, or there is no such nest.
+        AntsError if the cell is not free.
         """
-        self._check_nest(nest)
         grid, ground = self.colony.grid, self.view("ground")
         if not self._can_be_free(cell):
             raise AntsError(
@@ -139,39 +210,12 @@ class _World:
         self.colony.changed[self.w] = True
         self._change_food_sources(np.array([cell]), QUEEN)
 
-    def lay_trail(self, cells: Cells, level: int, field: str = TRAIL) -> Change:
-        """Set the trail, or a further field, of cells other than rocks."""
-        cells = self.index(cells)
-        number = [TRAIL, *self.colony.task.fields].index(field)
-        yield
-        self._lay(cells[self.view("walls")[cells] == 0], level, number)
+    def _add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> Change:
+        """Put newborn ants on free start cells; without a nest, nests take turns.
 
-    def add_ants(self, cells: Cells, heading: int | None = None, nest: int | None = None) -> Change:
-        """Put newborn ants on those of the cells that are empty, with random headings by default.
-
-        By default, each belongs to the nest of the nearest queen. AntsError if the capacity of the
-        colony is too small, or there is no such nest.
+        AntsError if there is too little room.
         """
-        self._check_nest(nest)
-        cells = self.index(cells)
-        distances = [self.colony.grid.distances(queen)[cells] for queen in self._queens()]
-        nests = np.argmin(distances, axis=0) if nest is None else np.full(len(cells), nest)
-        return self._add(cells, nests, heading)
-
-    def add_some(
-        self,
-        number: int | None,
-        share: float | None = None,
-        heading: int | None = None,
-        nest: int | None = None,
-    ) -> Change:
-        """Put a number of newborn ants, or a share of the living ones, on free start cells.
-
-        With a nest, they belong to it, and the share is that of its ants. Else nests take turns.
-        AntsError if there is too little room, or no such nest.
-        """
-        self._check_nest(nest)
-        n, colony, grid = self._amount(number, share, nest), self.colony, self.colony.grid
+        colony, grid = self.colony, self.colony.grid
         free = np.flatnonzero((self.view("ground") == EMPTY) & grid.exists)
         if n > len(free):
             raise AntsError(
@@ -186,45 +230,10 @@ class _World:
         ]
         return self._add(_in_turn(orders, n), np.resize(wanted, n), heading)
 
-    def remove_ants(self, cells: Cells, nest: int | None = None) -> Change:
-        """Remove the ants on these cells, or those of a nest, with the food that they carry."""
-        self._check_nest(nest)
-        cells = self.index(cells)
-        yield
-        slots = self._living_slots(nest)
-        self._remove(slots[np.isin(self.cells[slots], cells)])
-
-    def remove_some(
-        self, number: int | None, share: float | None = None, nest: int | None = None
-    ) -> Change:
-        """Remove a number of random ants, or a share; all ants if there are fewer.
-
-        With a nest, remove only its ants.
-        """
-        self._check_nest(nest)
-        n = self._amount(number, share, nest)
-        yield
-        slots = self._living_slots(nest)
-        words = self.all.stream(self.w).bits(len(slots))
-        self._remove(slots[np.argsort(words, kind="stable")[:n]])
-
-    def set_ants(self, n: int) -> Change:
-        """Set the number of ants; see `Interventions.set_ants`."""
-        living = self._living_slots()
-        free = int(np.count_nonzero(self.view("ground") == EMPTY))
-        room = min(self.colony.capacity, free + len(living))
-        if self.all.lasting:
-            room = min(room, int(np.count_nonzero(self.all.starts[self.w] == EMPTY)))
-        if n > room:
-            raise AntsError(f"ants is {n}, but there is room for {room}; choose fewer ants.")
-        more = n - len(living)
-        return self.add_some(more) if more >= 0 else self.remove_ants(self.cells[living[more:]])
-
-    # Parts of changes
-
-    def index(self, cells: Cells) -> np.ndarray:
-        """Return flat indices, or those of the cells of a region; AntsError if there is none."""
-        return self.colony.worlds[self.w].region(cells) if isinstance(cells, str) else cells
+    def _index(self, cells: Sequence[Any] | str) -> np.ndarray:
+        """Return the flat indices of cells, or of those of a region; AntsError if it is missing."""
+        world, grid = self.colony.worlds[self.w], self.colony.grid
+        return world.region(cells) if isinstance(cells, str) else indices(grid, cells)
 
     def view(self, name: str) -> np.ndarray:
         """Return a view of the world's part of an array."""
@@ -249,16 +258,11 @@ class _World:
         slots = np.flatnonzero(living)
         return slots[np.argsort(self.view("number")[slots])]
 
-    def _amount(self, number: int | None, share: float | None, nest: int | None) -> int:
+    def _amount(self, change: AddAnts | RemoveAnts) -> int:
         """Return a number of ants, or the number of a share of the living ones, rounded."""
-        if share is None:
-            assert number is not None
-            return number
-        return int(share * len(self._living_slots(nest)) + 0.5)
-
-    def _check_nest(self, nest: int | None) -> None:
-        if nest is not None:
-            checked_whole("nest", nest, least=0, most=self.colony.n_nests - 1)
+        if change.share is None:
+            return change.number or 0
+        return int(change.share * len(self._living_slots(change.nest)) + 0.5)
 
     def _queens(self) -> list[Any]:
         """Return the cell of each nest's queen."""
@@ -274,7 +278,7 @@ class _World:
         if all_.lasting:
             all_.starts[self.w], all_.changed = start, True
 
-    def _put(self, cells: np.ndarray, what: int, kind: int, loads: int | None = None) -> None:
+    def _fill(self, cells: np.ndarray, what: int, kind: int, loads: int | None = None) -> None:
         """Make cells without ants and queens EMPTY, OBSTACLE or FOOD, by default with all loads."""
         self.view("ground")[cells] = what
         self.view("walls")[cells] = what == OBSTACLE
@@ -400,22 +404,8 @@ class _World:
             )
 
 
-def _in_each_world(change: Callable[..., Change]) -> Callable[..., None]:
-    """Return a method of `Interventions` that makes a change of `_World` in each world."""
-
-    @wraps(change)
-    def changed(self: Interventions, *arguments: Any, **named: Any) -> None:
-        self._change(lambda world: change(world, *arguments, **named))
-
-    return changed
-
-
 class Interventions:
     """Changes of some worlds of a colony, and of the start of their later episodes.
-
-    Cells are flat indices, int (n,), without duplicates, or the name of a region, see `index`. A
-    cell on which something cannot be placed, because an ant, a rock or the queen is on it, does not
-    change. A method that raises an error changes nothing in any world.
 
     Args:
         worlds: Numbers of the worlds to change, None for all. Worlds of a colony share the numbers
@@ -437,73 +427,82 @@ class Interventions:
     ) -> None:
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None
-        self.worlds = self._checked_worlds(worlds)
+        n = len(colony.worlds)
+        numbers = range(n) if worlds is None else entries_of(worlds)
+        if not numbers or not all(isinstance(w, (int, np.integer)) and 0 <= w < n for w in numbers):
+            raise AntsError(
+                f"worlds is {shown(worlds)}; it must be a list of numbers from 0 to {n - 1}, or "
+                "None for all worlds."
+            )
+        self.worlds = tuple(dict.fromkeys(map(int, numbers)))
         self._first = colony.worlds
         self.starts = [_start_of(world) for world in colony.worlds] if lasting else []
         self._streams: dict[int, tuple[int, Stream]] = {}  # by world: the episode and its stream
         self.changed = False  # whether the next episode starts unlike the present one
 
-    def _checked_worlds(self, worlds: Sequence[int] | None) -> tuple[int, ...]:
-        n = len(self.colony.worlds)
-        several = range(n) if worlds is None else entries_of(worlds)
-        if several is None or not all(
-            isinstance(w, (int, np.integer)) and 0 <= w < n for w in several
-        ):
+    def apply(self, change: Intervention) -> None:
+        """Apply an intervention.
+
+        A cell on which something cannot be placed, because an ant, a rock or the queen is on it,
+        does not change.
+
+        Raises:
+            AntsError: A world does not allow the change; nothing has changed in any world.
+        """
+        colony = self.colony
+        given = isinstance(change, SetPolicy) and colony.is_given_actions  # they follow no policy
+        change.check_in(colony.worlds[self.worlds[0]], colony.task, colony.learns or given)
+        if change.in_all_worlds or (self.lasting and isinstance(change, SetAnts)):
+            self._check_all(change)
+        match change:
+            case Episode():
+                self.begin_episode()
+            case SetTask():
+                self.set_task(change.changed(colony.task))
+            case SetEpsilon():
+                colony.epsilon = change.value
+                colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
+            case SetLearningRate():
+                colony.training = replace(
+                    colony.training, learning_rate_decay=1.0, min_learning_rate=0.0
+                )
+                colony.set_learning_rate(change.value)
+            case SetPolicy():
+                table = change.table_for(colony.task)
+                for w in self.worlds:
+                    q = colony.part("q", w)
+                    q.reshape(-1, len(table), ROW)[..., :N_ACTIONS] = table
+                    note_best_actions(q)
+            case _:
+                self._change(change)
+
+    def _check_all(self, change: Intervention) -> None:
+        running = np.flatnonzero(self.colony.running).tolist()
+        if self.colony.episode >= 0 and not set(running) <= set(self.worlds):
             raise AntsError(
-                f"worlds is {shown(worlds)}; it must be a list of numbers from 0 to {n - 1}, or "
-                "None for all worlds."
+                f"the worlds of a colony share what `{change.path}` changes, so it cannot change "
+                "in some of them; change all worlds, or make a colony with a single seed."
             )
-        return tuple(dict.fromkeys(map(int, several)))
 
-    @property
-    def living(self) -> int:
-        """The number of living ants in the first of the worlds."""
-        return int(self.colony.arrays["worlds"][WorldRow.LIVING, self.worlds[0]])
-
-    def index(self, cells: Sequence[Any] | str) -> Cells:
-        """Return the flat indices of cells (x, y, z) or flat indices, without duplicates.
-
-        The name of a region remains. AntsError if a cell or the region does not exist.
-        """
-        if not isinstance(cells, str):
-            return indices(self.colony.grid, cells)
-        for one in self._each():
-            one.index(cells)
-        return cells
-
-    def is_empty(self, cell: int) -> bool:
-        """Return whether a cell is empty and has no ant, in all of the worlds."""
-        return all(one.view("ground")[cell] == EMPTY for one in self._each())
-
-    def everywhere(self) -> np.ndarray:
-        """Return the flat indices of all cells."""
-        return np.flatnonzero(self.colony.grid.exists)
-
-    put, move = _in_each_world(_World.put), _in_each_world(_World.move)
-    move_queen = _in_each_world(_World.move_queen)
-    lay_trail = _in_each_world(_World.lay_trail)
-    add_ants, add_some = _in_each_world(_World.add_ants), _in_each_world(_World.add_some)
-    remove_ants = _in_each_world(_World.remove_ants)
-    remove_some = _in_each_world(_World.remove_some)
-
-    def set_ants(self, n: int) -> None:
-        """Set the number of ants, now and, if the changes are lasting, in later episodes.
-
-        New ants take free cells in the order of `World.start`; ants with the highest numbers are
-        removed. AntsError if there is too little room.
-        """
-        if self.lasting:
-            self._check_all("the number of ants at the start")
-        self._change(lambda world: world.set_ants(n))
-        if self.lasting:
-            self.changed |= n != self.ants
-            self.ants = n
+    def _change(self, change: Intervention) -> None:
+        """Make a change in all worlds, after its checks in all; then their ants observe again."""
+        colony, worlds = self.colony, list(self.worlds)
+        colony.check_begun()
+        changes: list[Change] = [getattr(_World(self, w), change.path)(change) for w in worlds]
+        for in_world in changes:
+            next(in_world)
+        colony.ready[worlds] = False  # also after Ctrl-C before the end
+        for in_world in changes:
+            next(in_world, None)
+        colony.observe(worlds)
+        colony.ready[worlds] = True
+        if self.lasting and isinstance(change, SetAnts):
+            self.changed |= change.number != self.ants
+            self.ants = change.number
 
     def set_task(self, task: Task) -> None:
         """Set a task that differs only in settings that kernels read as numbers."""
-        self._check_all("the task")
         colony = self.colony
-        check_same_kernels(colony.task, task, colony.learns)
         levels = [
             (world, number, np.maximum(colony.stored_pheromone(world, number) - clock, 0))
             for world in range(len(colony.worlds))
@@ -515,29 +514,6 @@ class Interventions:
         for world, number, level in levels:
             clock = colony.trail_clock(world, number)
             colony.stored_pheromone(world, number)[:] = np.where(level > 0, level + clock, 0)
-
-    def set_epsilon(self, epsilon: float) -> None:
-        """Set epsilon, which no longer decays."""
-        self._check_all("epsilon")
-        colony = self.colony
-        colony.epsilon = epsilon
-        colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
-
-    def set_learning_rate(self, learning_rate: float) -> None:
-        """Set the learning rate, which no longer decays; AntsError if no ant learns."""
-        self._check_all("the learning rate")
-        colony = self.colony
-        check_learns(colony.learns)
-        colony.training = replace(colony.training, learning_rate_decay=1.0, min_learning_rate=0.0)
-        colony.set_learning_rate(learning_rate)
-
-    def set_policy(self, q_values: np.ndarray) -> None:
-        """Set the table (n_states, 5) that ants follow; AntsError unless they follow one."""
-        colony = self.colony
-        check_follows(colony.learns or colony.is_given_actions, colony.task)
-        for one in self._each():
-            one.view("q").reshape(-1, len(q_values), ROW)[..., :N_ACTIONS] = q_values
-            note_best_actions(one.view("q"))
 
     def state(self) -> str:
         """Return a hash of the whole state; colonies with equal hashes behave identically."""
@@ -608,30 +584,6 @@ class Interventions:
                 "leave one."
             )
         return start
-
-    def _check_all(self, what: str) -> None:
-        running = np.flatnonzero(self.colony.running).tolist()
-        if self.colony.episode >= 0 and not set(running) <= set(self.worlds):
-            raise AntsError(
-                f"the worlds of a colony share {what}, so it cannot change in some of them; change "
-                "all worlds, or make a colony with a single seed."
-            )
-
-    def _change(self, change: Callable[[_World], Change]) -> None:
-        """Make a change in all worlds, after its checks in all; then their ants observe again."""
-        colony, worlds = self.colony, list(self.worlds)
-        colony.check_begun()
-        several = [change(one) for one in self._each()]
-        for one in several:
-            next(one)
-        colony.ready[worlds] = False  # also after Ctrl-C before the end
-        for one in several:
-            next(one, None)
-        colony.observe(worlds)
-        colony.ready[worlds] = True
-
-    def _each(self) -> Iterator[_World]:
-        return (_World(self, w) for w in self.worlds)
 
 
 def _start_of(world: World) -> np.ndarray:

@@ -12,7 +12,7 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.stepping import Stepper
 from taichi_ants.errors import AntsError
 from taichi_ants.interventions import SetPolicy
-from taichi_ants.protocol import ProtocolEvent, When, check_room, checked_protocol
+from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
@@ -47,8 +47,6 @@ class Timetable:
         """Raise an AntsError if an intervention cannot happen in this colony."""
         colony = self._colony
         for event in self._events:
-            length = None if colony.ends_at_delivery else self._length
-            check_room(event, self._events, colony.task, colony.ants, colony.capacity, length)
             for intervention in event.interventions:
                 everywhere = isinstance(event, When) and intervention.in_all_worlds
                 if everywhere and len(colony.worlds) > 1:
@@ -56,8 +54,7 @@ class Timetable:
                         f"`when.{intervention.path}` would change all {len(colony.worlds)} worlds "
                         "of the colony, which share it; make a colony with a single seed."
                     )
-                learns = colony.learns or colony.is_given_actions
-                intervention.check_in(colony.worlds[0], colony.task, learns)
+                intervention.check_in(colony.worlds[0], colony.task, colony.learns)
 
     def __enter__(self) -> None:
         if not self._events:
@@ -108,6 +105,6 @@ class Timetable:
         self._interventions.worlds = tuple(np.flatnonzero(worlds).tolist())
         try:
             for intervention in event.interventions:
-                intervention.apply(self._interventions)
+                self._interventions.apply(intervention)
         except AntsError as error:
             raise AntsError(f"after {colony.ticks} ticks, {error}") from error

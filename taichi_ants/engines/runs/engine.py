@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, field
 from functools import partial
 from typing import Any
 
@@ -41,34 +41,6 @@ _WORKSPACE_BYTES = 256 * 2**20
 _MOST_NUMBERS = 2**30  # in one array of a launch, because kernels use 32-bit indices
 _PARALLEL_RUNS_ON_GPU = 4096
 
-# The arguments of the kernel for n runs of one learner, without those for world and task. Arrays
-# are flat, one run after another. The sizes of a memory are multiples of 8, see `layout.padded`.
-_NO_WORK: dict[str, Any] = {
-    "n_runs": 0,
-    "n_episodes": 0,
-    "regrows": 0,  # 1 if food grows back at once; 0 here, because a delivery ends the episode
-    "start_cells": np.zeros(1, np.int32),  # (n,)
-    "start_headings": np.zeros(1, np.int32),  # (n,)
-    "settings": np.zeros(1, np.float64),  # `layout.SETTINGS`, then the hyperparameters
-    "epsilon": np.zeros(1, np.float64),  # (n,), for the next episode
-    "learning_rate": np.zeros(1, np.float64),  # (n,), for the next episode
-    "random_states": np.zeros(1, np.uint64),  # (n,)
-    "streams": np.zeros(1, np.uint64),  # (n * n_episodes,), one per episode without learning
-    "tables": 0,
-    "floats_by_8": 0,
-    "integers_by_8": 0,
-    "q": np.zeros(1, np.float32),
-    "floats": np.zeros(1, np.float32),
-    "integers": np.zeros(1, np.int32),
-    "cells": np.zeros(1, np.int32),  # the packed cells of each run, see `step`
-    "keeps_tables": 0,  # 1 to write the table after each step
-    "outcomes": np.zeros((1, 1, 1), np.int32),  # (3, n, n_episodes): `layout.OUTCOMES`
-    "trace": np.zeros((1, 1), np.int32),  # (n * n_episodes * max_steps, columns): `layout.TRACE`
-    "trace_chances": np.zeros(1, np.float64),  # the probability with which the action was chosen
-    "trace_errors": np.zeros(1, np.float32),  # the TD error of each step
-    "trace_tables": np.zeros(1, np.float32),  # the table after each step
-}
-
 
 @dataclass(frozen=True)
 class Runs:
@@ -78,7 +50,7 @@ class Runs:
         seeds: The seed of each run, Python integers (n,), for worlds that do not list their ant.
         settings: float64 (n, columns), `layout.SETTINGS` and the hyperparameters of the learner.
         state: The state of the runs, contiguous arrays (n, ...), which the kernel updates.
-        streams: uint64 (n, episodes), a random stream for each episode without learning.
+        streams: uint64 (n, episodes), a random stream for each episode; none for learners.
         cost: The time of a step, relative to a step of Q-learning.
     """
 
@@ -86,7 +58,7 @@ class Runs:
     seeds: np.ndarray
     settings: np.ndarray
     state: RunState
-    streams: np.ndarray | None = None
+    streams: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), np.uint64))
     cost: float = 1.0
 
     @classmethod
@@ -157,31 +129,48 @@ class Launcher:
         rules, learner = Rules.of(task), runs.learner
         self._launch = Launch(partial(run_kernel, rules, learner, traced))
         falls = task.evaporation_in_training if learner else task.evaporation_in_evaluation
-        self._values = {**_NO_WORK, **laid_out([world], task, falls), "max_steps": max_steps}
-        self._launch(self._values)  # compiles the kernel
+        self._common = {**laid_out([world], task, falls), "max_steps": max_steps}
+        self.launch(slice(0, 0), slice(0, 0))  # compiles the kernel
 
     def launch(self, some: slice, episodes: slice, **arrays: Any) -> None:
-        """Do some episodes of some runs, and write the results into the arrays."""
-        runs, state = self._runs, self._runs.state
-        start_cells = self._cells[some]
+        """Do some episodes of some runs, and write the results into the arrays.
+
+        Arrays are flat, one run after another. The sizes of a memory are multiples of 8, see
+        `layout.padded`.
+        """
+        runs, state, start_cells = self._runs, self._runs.state, self._cells[some]
         values = {
             "n_runs": len(start_cells),
             "n_episodes": episodes.stop - episodes.start,
+            "regrows": 0,  # food that grows back at once has no effect, as a delivery is the end
             "start_cells": start_cells,
             "start_headings": self._headings[some],
-            "settings": runs.settings[some].reshape(-1),
+            "settings": runs.settings[some],
+            "epsilon": state.epsilon[some],
+            "learning_rate": state.learning_rate[some],
+            "random_states": state.random_states[some],
+            "streams": np.ascontiguousarray(runs.streams[some, episodes]),
             "tables": state.q.shape[1],
             "floats_by_8": state.floats.shape[1] // 8,
             "integers_by_8": state.integers.shape[1] // 8,
+            "q": state.q[some],
+            "floats": state.floats[some],
+            "integers": state.integers[some],
             "cells": np.empty(len(start_cells) * self.cells_of_a_run, np.int32),
-            **{name: array[some].reshape(-1) for name, array in vars(state).items()},
+            "keeps_tables": 0,  # 1 to write the table after each step
+            "outcomes": np.zeros((0, 0, 0), np.int32),  # (3, n, n_episodes): `layout.OUTCOMES`
+            "trace": np.zeros((0, 0), np.int32),  # (n * n_episodes * max_steps, `layout.TRACE`)
+            "trace_chances": np.zeros(0),  # the probability with which the action was chosen
+            "trace_errors": np.zeros(0, np.float32),  # the TD error of each step
+            "trace_tables": np.zeros(0, np.float32),  # the table after each step
             **arrays,
         }
-        if runs.streams is not None:
-            values["streams"] = np.ascontiguousarray(runs.streams[some, episodes]).reshape(-1)
-        # Taichi allows no arrays of length 0; the default of length 1 stays instead.
-        self._values.update({name: one for name, one in values.items() if getattr(one, "size", 1)})
-        self._launch(self._values)
+        for name, value in values.items():
+            if isinstance(value, np.ndarray):
+                flat = value if name in ("outcomes", "trace") else value.reshape(-1)
+                # Taichi allows no arrays of length 0.
+                values[name] = flat if flat.size else np.zeros((1,) * flat.ndim, flat.dtype)
+        self._launch({**values, **self._common})
 
 
 def do_episodes(

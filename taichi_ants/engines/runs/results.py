@@ -26,7 +26,6 @@ from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
 _KIND = Kind("training result", 7, "TrainingResult.save")
-_SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that `repr` of a result shows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,22 +135,18 @@ class TrainingResult(Record, Tidy):
 
     def __post_init__(self) -> None:
         """Check the shapes and types of arrays, because kernels rely on them."""
-        runs, state = (len(self.configs), len(self.seeds)), self.state
-        expect("the state of a result", state, RunState)
+        expect("the state of a result", self.state, RunState)
+        runs = len(self.configs), len(self.seeds)
         forms = {
             **dict.fromkeys(OUTCOMES, ("int32", (*runs, *np.shape(self.returns)[2:3]))),
-            "q": ("float32", (*runs, *np.shape(state.q)[2:3], self.task.n_states, ROW)),
-            # Kernels need sizes that are multiples of 8.
-            "floats": ("float32", (*runs, *(n // 8 * 8 for n in np.shape(state.floats)[2:3]))),
-            "integers": ("int32", (*runs, *(n // 8 * 8 for n in np.shape(state.integers)[2:3]))),
+            "q": ("float32", (*runs, None, self.task.n_states, ROW)),
+            **{"floats": ("float32", (*runs, None)), "integers": ("int32", (*runs, None))},
             "random_states": ("uint64", runs),
-            "epsilon": ("float64", runs),
-            "learning_rate": ("float64", runs),
+            **dict.fromkeys(("epsilon", "learning_rate"), ("float64", runs)),
         }
-        arrays = {**vars(self), **vars(state)}
+        arrays = {**vars(self), **vars(self.state)}
         for name, (kind, shape) in forms.items():
-            array = arrays[name]
-            as_array(f"the array {name} of a result", array, kind, shape)
+            as_array(f"the array {name} of a result", arrays[name], kind, shape)
 
     def measured(self) -> Measured:
         """Return the values of the measures of each episode of each run."""
@@ -199,25 +194,6 @@ class TrainingResult(Record, Tidy):
                 seconds=float(facts["seconds"]),
                 state=RunState(**state),
             )
-
-    def __repr__(self) -> str:
-        last = slice(-_SUMMED_UP, None)
-        lines = [
-            f"world: {self.world}",
-            f"seeds: {len(self.seeds)}, from {min(self.seeds)} to {max(self.seeds)}"
-            if len(self.seeds) > 1
-            else f"seed: {self.seeds[0]} (one run; seeds=range(5) trains five runs)",
-            f"episodes: {self.episodes}, of at most {self.max_steps} steps each",
-            f"task: {self.task}",
-            f"means over seeds and the last {min(_SUMMED_UP, self.episodes)} episodes:",
-        ]
-        for c, config in enumerate(self.configs[:_LISTED]):
-            means = (getattr(self, name)[c, :, last].mean() for name in OUTCOMES)
-            line = "    {}\n        return {:.4g}, steps {:.4g}, deliveries {:.3g}"
-            lines.append(line.format(config, *means))
-        if len(self.configs) > _LISTED:
-            lines.append(f"    and {len(self.configs) - _LISTED} more configurations")
-        return "\n    ".join(["TrainingResult(", *lines]) + "\n)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -273,9 +249,7 @@ def _measured(
 
 def _labels(configs: Sequence[TrainingConfig]) -> tuple[str, ...]:
     """Return a short name of each configuration: the settings that differ."""
-    rows = [{**one.as_dict(), **dict(one.hyperparameters)} for one in configs]
-    for row in rows:
-        row.pop("hyperparameters", None)
+    rows = [{**vars(one), **dict(one.hyperparameters), "hyperparameters": ""} for one in configs]
     names = dict.fromkeys(name for row in rows for name in row)
     differ = [name for name in names if len({str(row.get(name)) for row in rows}) > 1]
     return tuple(

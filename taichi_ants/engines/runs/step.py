@@ -120,14 +120,12 @@ def paper_state_of(half: ti.template(), a: ti.template(), base, ant, clock):
 
 
 @cache
-def state_seen(observation: Observation, half: bool, misreads: bool = False) -> Callable[..., Any]:
-    """Return a `ti.func` (a, base, ant, clock, paper_state) that returns the ant's state index.
+def observe_function(rules: Rules) -> Callable[..., Any]:
+    """Return a `ti.func` (a, base, ant, clock) that returns what an ant sees.
 
-    With `misreads`, it may misread cells, and returns the state index and the random stream after
-    the draws; see `rules.noise`.
+    It returns the paper's state, the state index, and the random stream after possible draws.
     """
-    if observation.name == "paper":  # no view is needed
-        return _paper_state_misread if misreads else _paper_state_itself
+    observation, is_paper = rules.observation, rules.observation.name == "paper"
     in_view = observation.cells
     left, forward, right = observation.ahead
     view_of, encode = view_type(observation, False), encode_function(observation)
@@ -145,48 +143,20 @@ def state_seen(observation: Observation, half: bool, misreads: bool = False) -> 
             view.codes[k] = ground_of(cell)
         ahead = ti.max(view.levels[left], view.levels[forward])
         view.strongest = ti.max(ahead, view.levels[right])
-        fill_codes(half, "", view, observation)
+        fill_codes(rules.half, "", view, observation)
         return view
 
     @ti.func
-    def see_state(a: ti.template(), base, ant, clock, paper_state):
-        return encode(see(a, base, ant, clock))
-
-    @ti.func
-    def misread_state(a: ti.template(), base, ant, clock, paper_state):
-        view = see(a, base, ant, clock)
-        after = noise.misread_view(view, observation, ant.random_state, a.misread_below)
-        return encode(view), after
-
-    return misread_state if misreads else see_state
-
-
-@ti.func
-def _paper_state_itself(a: ti.template(), base, ant, clock, paper_state):
-    return paper_state
-
-
-@ti.func
-def _paper_state_misread(a: ti.template(), base, ant, clock, paper_state):
-    return noise.misread_paper_state(paper_state, ant.random_state, a.misread_below)
-
-
-@cache
-def observe_function(rules: Rules) -> Callable[..., Any]:
-    """Return a `ti.func` (a, base, ant, clock) that returns what an ant sees.
-
-    It returns the paper's state, the state index, and the random stream after possible draws.
-    """
-    state_of = state_seen(rules.observation, rules.half, rules.misreads)
-
-    @ti.func
     def observe(a: ti.template(), base, ant, clock):
-        paper_state, state = paper_state_of(rules.half, a, base, ant, clock), 0
-        after = ant.random_state
-        if ti.static(rules.misreads):
-            state, after = state_of(a, base, ant, clock, paper_state)
-        else:
-            state = state_of(a, base, ant, clock, paper_state)
+        paper_state = paper_state_of(rules.half, a, base, ant, clock)
+        state, after = paper_state, ant.random_state
+        if ti.static(not is_paper):
+            view = see(a, base, ant, clock)
+            if ti.static(rules.misreads):
+                after = noise.misread_view(view, observation, ant.random_state, a.misread_below)
+            state = encode(view)
+        elif ti.static(rules.misreads):  # no view is needed
+            state, after = noise.misread_paper_state(paper_state, ant.random_state, a.misread_below)
         return paper_state, state, after
 
     return observe

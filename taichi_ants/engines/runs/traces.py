@@ -6,7 +6,7 @@ Traces come from the same kernel as training and evaluation, compiled to record 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -108,17 +108,15 @@ def rollout(
     Instead of the table, you can pass the `TrainingResult` of a single run, or a `Policy`. Other
     arguments and errors are those of `evaluate`. Numbers start at 0.
     """
-    task = arguments.checked_lone_task(task)
-    max_steps = arguments.checked_max_steps(max_steps, task)
+    task, max_steps = arguments.checked_run(world, task, max_steps)
     table = checked_table(q_values, task)
     seeds = arguments.checked_seeds_for(seed, ())
-    numbers = np.array([checked_whole("number", number, least=0)])
+    number = checked_whole("number", number, least=0)
     epsilon = arguments.checked_share("epsilon", epsilon)
-    trace = _trace(world, task, Runs.following(table[None], seeds, numbers, epsilon), max_steps)
-    made_by = RolloutArguments(
-        world, task, int(seeds[0]), max_steps, int(numbers[0]), table.copy(), epsilon
-    )
-    return replace(trace, arguments=made_by)
+    runs = Runs.following(table[None], seeds, np.array([number]), epsilon)
+    seed, kept = int(seeds[0]), table.copy()
+    made_by = RolloutArguments(world, task, seed, max_steps, number, kept, epsilon)
+    return next(_followed(world, task, runs, max_steps, made_by))
 
 
 def trace_policies(
@@ -132,17 +130,21 @@ def trace_policies(
 
     `seeds` has one seed per policy, and may repeat seeds. Other arguments are those of `evaluate`.
     """
-    task = arguments.checked_lone_task(task)
+    task, max_steps = arguments.checked_run(world, task, max_steps)
     tables = checked_values(q_values, task)
-    arguments.checked_world(world)
-    # A step needs ten times as much memory as a cell of the world.
-    per_policy = max(arguments.checked_max_steps(max_steps, task), world.grid.size // 10)
-    for first in range(0, len(tables), size := max(1, MAX_ROLLOUT_STEPS // per_policy)):
-        some = tables[first : first + size]
-        words = np.array(seeds[first : first + size], dtype=object)
-        runs = Runs.following(some, words, np.zeros(1, dtype=int), epsilon=0.0)
-        trace = _trace(world, task, runs, max_steps)
-        yield replace(trace, episodes=trace.episodes + first)
+    runs = Runs.following(tables, np.array(seeds, dtype=object), np.zeros(1, dtype=int), 0.0)
+    yield from _followed(world, task, runs, max_steps)
+
+
+def _followed(
+    world: World, task: Task, runs: Runs, max_steps: int, made_by: RolloutArguments | None = None
+) -> Iterator[Trace]:
+    """Yield the traces of one rollout of each policy; its number is that of the episode."""
+    _check_length(max_steps, MAX_ROLLOUT_STEPS)
+    for steps in record_steps(world, task, max_steps, runs, episodes=1):
+        values = runs.state.q[steps["runs"], 0, steps["states"], :N_ACTIONS]
+        steps["episodes"] = steps["runs"].astype(np.int32)
+        yield _trace(world, steps, q_values=values, arguments=made_by)
 
 
 def trace_training(
@@ -158,48 +160,40 @@ def trace_training(
     Arguments and errors are those of `train`; episodes * max_steps * n_states is limited to 12.8
     million.
     """
-    arguments.checked_world(world, learns=True)
-    task = arguments.checked_lone_task(task)
-    max_steps = arguments.checked_max_steps(max_steps, task)
+    task, max_steps = arguments.checked_run(world, task, max_steps, learns=True)
+    episodes = checked_whole("episodes", episodes)
     several = arguments.checked_configs(config, task)
     if len(several) > 1:
         raise AntsError(f"config has {len(several)} configurations; pass a single one.")
-    seeds = arguments.checked_seeds_for(seed, ())
-    state = RunState.initial(several, seeds.tolist(), task.n_states).part([0])
-    runs = Runs.learning(several, seeds.tolist(), state)
-    trace = _trace(world, task, runs, max_steps, checked_whole("episodes", episodes))
-    return replace(
-        trace, arguments=RolloutArguments(world, task, int(seeds[0]), max_steps, config=several[0])
-    )
-
-
-def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int = 1) -> Trace:
-    """Return the trace of runs, or of one run if it learns, with episodes numbered in sequence."""
-    capacity = episodes * max_steps
-    learns = runs.learner is not None
-    most = MAX_TABLE_ROWS // task.n_states if learns else MAX_ROLLOUT_STEPS
-    if capacity > most:
-        raise AntsError(
-            f"episodes * max_steps is {capacity}; a trace has at most {most} steps, so reduce one "
-            "of them."
-        )
-    arguments.checked_world(world)
-    runtime.start()
+    _check_length(episodes * max_steps, min(MAX_ROLLOUT_STEPS, MAX_TABLE_ROWS // task.n_states))
+    seeds = arguments.checked_seeds_for(seed, ()).tolist()
+    runs = Runs.learning(several, seeds, RunState.initial(several, seeds, task.n_states).part([0]))
     before = runs.state.q[:, 0, :, :N_ACTIONS].copy()
-    tables = np.empty((capacity if learns else 0, *runs.state.q.shape[2:]), dtype=np.float32)
-    launcher, everything = Launcher(world, task, max_steps, runs, traced=True), slice(0, len(runs))
-    recorded, errors, _, run = _launch(
-        launcher, runs, everything, slice(0, episodes), max_steps, tables
-    )
-    recorded["episodes"] += run.astype(np.int32) * episodes
-    recorded["cells"] = world.grid.cells(recorded["cells"])
-    recorded["terminated"] = recorded["terminated"].astype(bool)
-    if not learns:
-        return Trace(**recorded, q_values=before[run, recorded["states"]])
-    n = len(run)
+    tables = np.empty((episodes * max_steps, *runs.state.q.shape[2:]), dtype=np.float32)
+    (steps,) = record_steps(world, task, max_steps, runs, episodes, tables=tables)
+    n = len(steps["states"])
     after = tables[:n, :, :N_ACTIONS]
-    values = np.concatenate([before, after[:-1]])[np.arange(n), recorded["states"]]
-    return Trace(**recorded, q_values=values, td_errors=errors, tables=after)
+    values = np.concatenate([before, after[:-1]])[np.arange(n), steps["states"]]
+    made_by = RolloutArguments(world, task, seeds[0], max_steps, config=several[0])
+    more = {"q_values": values, "td_errors": steps["td_errors"], "tables": after}
+    return _trace(world, steps, **more, arguments=made_by)
+
+
+def _check_length(steps: int, most: int) -> None:
+    """Raise AntsError if a trace would be too long."""
+    if steps > most:
+        raise AntsError(
+            f"episodes * max_steps is {steps}; a trace has at most {most} steps, so reduce one of "
+            "them."
+        )
+
+
+def _trace(world: World, steps: dict[str, np.ndarray], **more: Any) -> Trace:
+    """Return the trace of recorded steps."""
+    columns: dict[str, Any] = {name: steps[name] for name in TRACE}
+    columns["cells"] = world.grid.cells(columns["cells"])
+    columns["terminated"] = columns["terminated"].astype(bool)
+    return Trace(**columns, **more)
 
 
 def record_steps(
@@ -209,53 +203,33 @@ def record_steps(
     runs: Runs,
     episodes: int,
     progress: Progress | None = None,
-) -> Iterator[tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]]:
+    tables: np.ndarray | None = None,
+) -> Iterator[dict[str, np.ndarray]]:
     """Yield the steps of the next episodes of many runs, in pieces, and update the runs' state.
 
-    A piece is the columns of a trace, with episodes numbered from 0 in each run; the probability of
-    each action, float64 (n,); and the number of the run, int64 (n,). Pieces of a run are in order.
+    A piece is the columns `TRACE`, with episodes numbered from 0 in each run, and further arrays
+    (n,): "runs", the number of the run, int64; "chances", the probability of each action, float64;
+    and "td_errors", float32, of learners. Pieces of a run are in order. If `tables` is given, the
+    kernel writes the table after each step of the piece into it.
     """
-    arguments.check_progress(progress)
     runtime.start()
     launcher = Launcher(world, task, max_steps, runs, traced=True)
-    runs_each = max(1, min(len(runs), MAX_ROLLOUT_STEPS // max_steps))
+    keeps = {} if tables is None else {"keeps_tables": 1, "trace_tables": tables}
+    # A step needs ten times as much memory as a cell of the world.
+    most_runs = MAX_ROLLOUT_STEPS // max(max_steps, world.grid.size // 10)
+    runs_each = max(1, min(len(runs), most_runs))
     episodes_each = max(1, MAX_ROLLOUT_STEPS // (runs_each * max_steps))
     for some, part in pieces(len(runs), episodes, runs_each, episodes_each, progress):
-        columns, _, chances, run = _launch(launcher, runs, some, part, max_steps)
+        n_runs, n_episodes = some.stop - some.start, part.stop - part.start
+        capacity = n_episodes * max_steps  # the most steps of a run
+        integers = np.empty((n_runs * capacity, len(TRACE)), np.int32)
+        chances, errors = np.empty(n_runs * capacity), np.empty(n_runs * capacity, np.float32)
+        outcomes = np.zeros((len(OUTCOMES), n_runs, n_episodes), np.int32)
+        arrays = {"trace": integers, "trace_errors": errors, "trace_chances": chances}
+        launcher.launch(some, part, outcomes=outcomes, **arrays, **keeps)
+        steps_of_run = outcomes[STEPS].sum(axis=1)
+        taken = (np.arange(capacity) < steps_of_run[:, None]).reshape(-1)
+        columns = dict(zip(TRACE, integers[taken].T, strict=True))
         columns["episodes"] += part.start
-        yield columns, chances, run + some.start
-
-
-def _launch(
-    launcher: Launcher,
-    runs: Runs,
-    some: slice,
-    part: slice,
-    max_steps: int,
-    tables: np.ndarray | None = None,
-) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray]:
-    """Return columns, TD errors, probabilities of actions, and runs of some episodes of some runs.
-
-    If `tables` is given, write the table after each step into it.
-    """
-    n_runs, n_episodes = some.stop - some.start, part.stop - part.start
-    capacity = n_episodes * max_steps  # the most steps of a run
-    rows, learns = n_runs * capacity, runs.learner is not None
-    integers = np.empty((rows, len(TRACE)), dtype=np.int32)
-    errors, chances = np.empty(rows if learns else 0, np.float32), np.empty(rows)
-    outcomes = np.zeros((len(OUTCOMES), n_runs, n_episodes), dtype=np.int32)
-    keeps = {} if tables is None else {"keeps_tables": 1, "trace_tables": tables.reshape(-1)}
-    launcher.launch(
-        some,
-        part,
-        outcomes=outcomes,
-        trace=integers,
-        trace_errors=errors,
-        trace_chances=chances,
-        **keeps,
-    )
-    steps_of_run = outcomes[STEPS].sum(axis=1)
-    taken = (np.arange(capacity) < steps_of_run[:, None]).reshape(-1)
-    columns = dict(zip(TRACE, integers[taken].T, strict=True))
-    run = np.repeat(np.arange(n_runs), steps_of_run)
-    return columns, errors[taken] if learns else errors, chances[taken], run
+        columns["runs"] = np.repeat(np.arange(some.start, some.stop), steps_of_run)
+        yield {**columns, "chances": chances[taken], "td_errors": errors[taken]}

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import arguments, learners, runtime
+from taichi_ants import arguments, runtime
 from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.runs.engine import Progress, Runs, do_episodes
 from taichi_ants.engines.runs.results import Rollouts, RunState, TrainingResult, memory_for
@@ -54,23 +54,12 @@ def train(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    task = arguments.checked_lone_task(task)
+    task, max_steps = arguments.checked_run(world, task, max_steps, learns=True)
     configs = arguments.checked_configs(configs, task)
     seeds = arguments.checked_seeds(seeds)
-    arguments.checked_world(world, learns=True)
-    none_yet = np.zeros((len(configs), len(seeds), 0), dtype=np.int32)
-    start = TrainingResult(
-        world=world,
-        configs=configs,
-        seeds=seeds,
-        max_steps=arguments.checked_max_steps(max_steps, task),
-        task=task,
-        returns=none_yet,
-        steps=none_yet,
-        deliveries=none_yet,
-        seconds=0.0,
-        state=RunState.initial(configs, seeds, task.n_states),
-    )
+    outcomes = (np.zeros((len(configs), len(seeds), 0), dtype=np.int32),) * 3
+    state = RunState.initial(configs, seeds, task.n_states)
+    start = TrainingResult(world, configs, seeds, max_steps, task, *outcomes, 0.0, state)
     return _train(start, episodes, threads, arch, progress)
 
 
@@ -111,42 +100,35 @@ def _train(
 ) -> TrainingResult:
     """Return what `continue_training` returns, but change the state of the given result."""
     episodes = checked_whole("episodes", episodes)
-    arguments.check_progress(progress)
     runtime.start(threads, arch)
-    state, shape = result.state, (len(result.configs), len(result.seeds))
-    outcomes = np.zeros((3, *shape, episodes), dtype=np.int32)
-    # One kernel and one cost for each learner with its hyperparameters.
+    configs, seeds, seconds = result.configs, result.seeds, 0.0
+    outcomes = np.zeros((len(OUTCOMES), len(configs), len(seeds), episodes), dtype=np.int32)
+    # One kernel for each learner, and one cost for each learner with its hyperparameters.
     groups: dict[tuple, list[int]] = {}
-    for c, config in enumerate(result.configs):
+    for c, config in enumerate(configs):
         groups.setdefault((config.learner, config.hyperparameters), []).append(c)
-    costs = []
+    done = 0
     for group in groups.values():
-        learner = learners.get(result.configs[group[0]].learner)
-        costs.append(learner.cost(learner.settings(result.configs[group[0]])) * len(group))
-    done, seconds = 0.0, 0.0
-    for group, cost in zip(groups.values(), costs, strict=True):
-        chosen = [result.configs[c] for c in group]
+        chosen, n = [configs[c] for c in group], len(group)
         # A slice copies nothing.
-        in_a_row = group[-1] + 1 - group[0] == len(group)
-        where = slice(group[0], group[-1] + 1) if in_a_row else group
-        runs = Runs.learning(chosen, result.seeds, state.part(where))
-        share = cost / sum(costs)
-        part = progress and partial(_report, progress, done, share)
-        into = outcomes[:, where].reshape(3, len(runs), episodes)  # a view, or a copy
+        where = slice(group[0], group[0] + n) if group[-1] - group[0] == n - 1 else group
+        runs = Runs.learning(chosen, seeds, result.state.part(where))
+        into = outcomes[:, where].reshape(len(OUTCOMES), len(runs), episodes)  # a view, or a copy
+        part = progress and partial(_report, progress, done, n, len(configs))
         seconds += do_episodes(result.world, result.task, result.max_steps, runs, into, part)
-        outcomes[:, where] = into.reshape(3, len(group), shape[1], episodes)
-        check_finite(runs.state.q, chosen, result.seeds)
-        state.put(where, runs.state)
-        done += share
+        outcomes[:, where] = into.reshape(len(OUTCOMES), n, len(seeds), episodes)
+        check_finite(runs.state.q, chosen, seeds)
+        result.state.put(where, runs.state)
+        done += n
     joined: dict[str, Any] = dict(zip(OUTCOMES, outcomes, strict=True))
     if result.episodes:
         joined = {n: np.concatenate([getattr(result, n), a], axis=2) for n, a in joined.items()}
     return replace(result, **joined, seconds=seconds)
 
 
-def _report(progress: Progress, done: float, share: float, part: float) -> None:
-    """Report the progress of one part of the work as progress of the whole."""
-    progress(done + share * part)
+def _report(progress: Progress, done: int, n: int, total: int, share: float) -> None:
+    """Report the progress of `n` configurations, of which a share is done, as that of all."""
+    progress((done + n * share) / total)
 
 
 def evaluate(
@@ -176,7 +158,7 @@ def evaluate(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    task = arguments.checked_lone_task(task)
+    task, max_steps = arguments.checked_run(world, task, max_steps)
     tables = checked_values(q_values, task)
     if tables.ndim == 2 and (several := len(arguments.checked_seeds(seeds))) > 1:
         tables = np.broadcast_to(tables, (several, *tables.shape))
@@ -184,13 +166,11 @@ def evaluate(
     run_seeds = arguments.checked_seeds_for(seeds, shape)
     rollouts = checked_whole("rollouts", rollouts)
     epsilon = arguments.checked_share("epsilon", epsilon)
-    max_steps = arguments.checked_max_steps(max_steps, task)
-    arguments.check_progress(progress)
     runtime.start(threads, arch)
     flat = tables.reshape(-1, *tables.shape[-2:])
     runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)
     outcomes = np.empty((3, len(runs), rollouts), np.int32)
-    do_episodes(arguments.checked_world(world), task, max_steps, runs, outcomes, progress)
+    do_episodes(world, task, max_steps, runs, outcomes, progress)
     returns, steps, deliveries = outcomes.reshape(3, *shape, rollouts)
     of_tables = tuple(run_seeds[: shape[-1] if shape else 1].tolist())
     return Rollouts(returns, steps, deliveries, of_tables)

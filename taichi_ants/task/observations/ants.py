@@ -1,7 +1,6 @@
 """The three cells ahead; ants with the other load differ from rocks."""
 
-from taichi_ants.task.observations.observation import Observation
-from taichi_ants.task.states import name_of_codes
+from taichi_ants.task.observations.observation import of_codes
 
 
 def encode(view):
@@ -24,12 +23,10 @@ def encode(view):
     return index
 
 
-ANTS = Observation(
+ANTS = of_codes(
     "ants",
-    2 * 6**3,
     encode,
-    name_of=name_of_codes(3, "EOTFPA", "EOSQPA"),
+    ("EOTFPA", "EOSQPA"),
     summary="the three cells ahead, distinguishing ants with the other load from rocks",
     letters="P ant on a better cell, A ant on a cell that is not better",
-    shape=(2, 6, 6, 6),
 )

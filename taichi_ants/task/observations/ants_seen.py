@@ -1,7 +1,6 @@
 """The three cells ahead; ants differ from rocks."""
 
-from taichi_ants.task.observations.observation import Observation
-from taichi_ants.task.states import name_of_codes
+from taichi_ants.task.observations.observation import of_codes
 
 
 def encode(view):
@@ -15,12 +14,10 @@ def encode(view):
     return index
 
 
-ANTS_SEEN = Observation(
+ANTS_SEEN = of_codes(
     "ants_seen",
-    2 * 5**3,
     encode,
-    name_of=name_of_codes(3, "EOTFA", "EOSQA"),
+    ("EOTFA", "EOSQA"),
     summary="the three cells ahead, distinguishing ants from rocks",
     letters="A another ant",
-    shape=(2, 5, 5, 5),
 )

@@ -1,9 +1,6 @@
 """The paper's codes of five cells: those ahead, behind left and behind right."""
 
-from taichi_ants.task.observations.observation import Observation
-from taichi_ants.task.states import name_of_codes
-
-CELLS = (-2, -1, 0, 1, 2)
+from taichi_ants.task.observations.observation import of_codes
 
 
 def encode(view):
@@ -14,12 +11,9 @@ def encode(view):
     return index
 
 
-FIVE_CELLS = Observation(
+FIVE_CELLS = of_codes(
     "five_cells",
-    2 * 4**5,
     encode,
-    CELLS,
-    name_of_codes(len(CELLS), "EOTF", "EOSQ"),
-    "all neighbouring cells except the one behind",
-    shape=(2, *[4] * 5),
+    cells=(-2, -1, 0, 1, 2),
+    summary="all neighbouring cells except the one behind",
 )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from taichi_ants.registry import Registry
+from taichi_ants.task.states import CELL_LETTERS, name_of_codes
 
 AHEAD = (-1, 0, 1)
 
@@ -74,6 +75,25 @@ class Observation:
     def ahead(self) -> tuple[int, ...]:
         """The indices in `cells` of the cells left, forward and right."""
         return tuple(self.cells.index(cell) for cell in AHEAD)
+
+
+def of_codes(
+    name: str,
+    encode: Callable[[Any], int],
+    names: tuple[str, str] = CELL_LETTERS,
+    cells: tuple[int, ...] = AHEAD,
+    summary: str = "",
+    letters: str = "",
+) -> Observation:
+    """Return an observation whose state is the load, then a code of each cell, as digits.
+
+    `names` has a letter for each code, for an ant without food and with food.
+    """
+    base, n = len(names[0]), len(cells)
+    shape = 2, *[base] * n
+    return Observation(
+        name, 2 * base**n, encode, cells, name_of_codes(n, *names), summary, letters, shape
+    )
 
 
 # The package's `__init__` adds the built-in ones.

@@ -1,7 +1,6 @@
 """The observation of the paper's ants: the three cells ahead, four codes each."""
 
-from taichi_ants.task.observations.observation import Observation
-from taichi_ants.task.states import state_name
+from taichi_ants.task.observations.observation import of_codes
 
 
 def encode(view):
@@ -9,11 +8,4 @@ def encode(view):
     return view.paper_state
 
 
-PAPER = Observation(
-    "paper",
-    128,
-    encode,
-    name_of=state_name,
-    summary="the three cells ahead, four codes each",
-    shape=(2, 4, 4, 4),
-)
+PAPER = of_codes("paper", encode, summary="the three cells ahead, four codes each")

@@ -1,7 +1,6 @@
 """The three cells ahead; ants differ from rocks, and ants worth following from other ants."""
 
-from taichi_ants.task.observations.observation import Observation
-from taichi_ants.task.states import name_of_codes
+from taichi_ants.task.observations.observation import of_codes
 
 
 def encode(view):
@@ -26,15 +25,13 @@ def encode(view):
     return index
 
 
-QUEUES = Observation(
+QUEUES = of_codes(
     "queues",
-    2 * 7**3,
     encode,
-    name_of=name_of_codes(3, "EOTFPAp", "EOSQPAp"),
+    ("EOTFPAp", "EOSQPAp"),
     summary="like ants, also distinguishing ants with the same load on a better cell",
     letters=(
         "P ant with the other load on a better cell, A on a cell that is not better, "
         "p ant with the same load on a better cell"
     ),
-    shape=(2, 7, 7, 7),
 )

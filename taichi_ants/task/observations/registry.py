@@ -42,44 +42,43 @@ def register(observation: Observation) -> Observation:
     expect("observation", observation, Observation)
     name, encode, cells = observation.name, observation.encode, observation.cells
     OBSERVATIONS.check_new(name)
-    for text in ("letters", "summary"):
-        expect(f"{text} of {name!r}", getattr(observation, text), str)
-    checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
+    n_states = checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
     # Kernels cannot compile lambdas.
-    named = inspect.isfunction(encode) and encode.__name__ != "<lambda>"
-    if not named or len(inspect.signature(encode).parameters) != 1:
-        raise AntsError(
-            f"encode of {name!r} is {shown(encode)}; it must be a function of one argument, "
-            "defined with def; see taichi_ants.task.Observation."
-        )
-    known = isinstance(cells, tuple) and all(cell in range(-2, 4) for cell in cells)
-    if not known or len(set(cells)) < len(cells) or not set(AHEAD) <= set(cells):
-        raise AntsError(
-            f"cells of {name!r} is {shown(cells)}; it must be a tuple of -1, 0, 1, and optionally "
-            "-2, 2 and 3, each once."
-        )
-    _check_reads(observation)
-    shape = observation.shape
-    expect(f"shape of {name!r}", shape, tuple)
-    lengths = [checked_whole(f"shape of {name!r}", length) for length in shape]
-    if shape and math.prod(lengths) != observation.n_states:
-        raise AntsError(
-            f"shape of {name!r} is {shape}, whose product is not its n_states, "
-            f"{observation.n_states}; correct one of them."
-        )
+    is_function = inspect.isfunction(encode) and encode.__name__ != "<lambda>"
+    reads = observation.reads if isinstance(observation.reads, tuple) else ("",)
+    in_view = [str(read) for read in reads] + [f"own_{read}" for read in reads]
+    shape = observation.shape if isinstance(observation.shape, tuple) else (0,)
+    lengths = [length if isinstance(length, int) else 0 for length in shape]
+    for field, fits, form in (
+        (
+            "encode",
+            is_function and len(inspect.signature(encode).parameters) == 1,
+            "a function of one argument, defined with def",
+        ),
+        (
+            "cells",
+            isinstance(cells, tuple)
+            and len(set(cells)) == len(cells)
+            and set(AHEAD) <= set(cells) <= set(range(-2, 4)),
+            "a tuple of -1, 0, 1, and optionally -2, 2 and 3, each once",
+        ),
+        (
+            "reads",
+            len({*in_view, *_OF_VIEWS}) == len(in_view) + len(_OF_VIEWS)
+            and all(map(str.isidentifier, in_view)),
+            "a tuple of names of fields, each once, and neither they nor own_NAME can be names in "
+            "a view",
+        ),
+        (
+            "shape",
+            not lengths or math.prod(lengths) == n_states,
+            f"a tuple of whole numbers whose product is n_states, {n_states}",
+        ),
+    ):
+        if not fits:
+            raise AntsError(
+                f"{field} of {name!r} is {shown(getattr(observation, field))}; it must be {form}; "
+                "see taichi_ants.task.Observation."
+            )
     try_in_python(observation)
     return OBSERVATIONS.add(name, observation)
-
-
-def _check_reads(observation: Observation) -> None:
-    reads = observation.reads
-    expect(f"reads of {observation.name!r}", reads, tuple)
-    taken = {*_OF_VIEWS, *(f"own_{name}" for name in reads if isinstance(name, str))}
-    for name in reads:
-        is_word = isinstance(name, str) and name.isidentifier()
-        if not is_word or name in taken or f"own_{name}" in _OF_VIEWS:
-            raise AntsError(
-                f"reads of {observation.name!r} contains {shown(name)}; it must contain names of "
-                f"fields, each once, and neither they nor own_NAME can be names in a view."
-            )
-        taken.add(name)

@@ -1,9 +1,6 @@
 """The paper's codes of all six neighbouring cells."""
 
-from taichi_ants.task.observations.observation import Observation
-from taichi_ants.task.states import name_of_codes
-
-CELLS = (-2, -1, 0, 1, 2, 3)
+from taichi_ants.task.observations.observation import of_codes
 
 
 def encode(view):
@@ -14,12 +11,6 @@ def encode(view):
     return index
 
 
-SIX_CELLS = Observation(
-    "six_cells",
-    2 * 4**6,
-    encode,
-    CELLS,
-    name_of_codes(len(CELLS), "EOTF", "EOSQ"),
-    "all neighbouring cells",
-    shape=(2, *[4] * 6),
+SIX_CELLS = of_codes(
+    "six_cells", encode, cells=(-2, -1, 0, 1, 2, 3), summary="all neighbouring cells"
 )

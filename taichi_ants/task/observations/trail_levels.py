@@ -1,7 +1,6 @@
 """The three cells ahead; a trail is weak, medium or strong, relative to the strongest ahead."""
 
-from taichi_ants.task.observations.observation import Observation
-from taichi_ants.task.states import name_of_codes
+from taichi_ants.task.observations.observation import of_codes
 
 
 def encode(view):
@@ -32,12 +31,10 @@ def encode(view):
     return index
 
 
-TRAIL_LEVELS = Observation(
+TRAIL_LEVELS = of_codes(
     "trail_levels",
-    2 * 6**3,
     encode,
-    name_of=name_of_codes(3, "EO123F", "EO--SQ"),
+    ("EO123F", "EO--SQ"),
     summary="the three cells ahead, with three strengths of trails",
     letters="1 2 3 trail, from weak to strong",
-    shape=(2, 6, 6, 6),
 )

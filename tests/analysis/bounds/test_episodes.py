@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plain_runs import rollout
 from plain_search import PlainWorld, search_all_sequences, search_optimal, search_shortest
 
 from taichi_ants.analysis.bounds import episodes
 from taichi_ants.analysis.bounds.episodes import EpisodeBounds, ExpectedEpisode
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Pheromone, Rewards, Task
 from taichi_ants.worlds import paper
 from taichi_ants.worlds.world import World
@@ -106,122 +104,11 @@ def test_a_large_discount_factor_makes_the_ant_walk_the_trail_forever() -> None:
     assert value == pytest.approx(first_way + 0.99**16 * turn_and_way)
 
 
-def test_no_policy_delivers_sooner() -> None:
-    world = World(
-        (4, 3, 2),
-        (0, 0, 0),
-        [(3, 0, 0), (3, 2, 0)],
-        [(2, 0, 0)],
-        [((1, 1, 0), 3), ((2, 1, 0), 3)],
-        [((1, 0, 0), 0)],
-    )
-    shortest = bounds_of(world).shortest()
-    assert shortest is not None
-    rollouts = [
-        rollout(
-            world,
-            policy,
-            number=number,
-            max_steps=60,
-            task=Task(evaporation_in_evaluation=False),
-        )
-        for policy in (random_policy(), trail_follower())
-        for number in range(40)
-    ]
-    delivered = [run for run in rollouts if run.deliveries[0]]
-    assert delivered
-    assert all(run.steps[0] >= shortest.steps for run in delivered)
-
-
-def test_a_pick_up_of_one_of_two_foods_is_luck_for_the_shortest_chance_for_the_best() -> None:
-    # Eight cells, y = 1 above, x to the right. The ant at A looks towards the queen and sees the
-    # foods 1 and 2; all else is rock.
-    #     # # 2 #
-    #     Q 1 A #
-    # Food 1 opens the way: the ant, turned round, turns back in two blocked moves (-2), goes to the
-    # queen's neighbour (+1) and gives: 3 - 2 + 1 + 10 = 12 in 5 steps.
-    # Food 2 opens only its own cell, as far from the queen: a blocked move (-1), the move there
-    # (0), then again and again two blocked moves and the move back. After the pick-up, the sixth
-    # step completes -1 + 0 - 2 + 0: 3 - 3 = 0 in 6 steps.
-    world = World(
-        (4, 2, 1),
-        (0, 0, 0),
-        foods=[(1, 0, 0), (2, 1, 0)],
-        obstacles=[(0, 1, 0), (1, 1, 0), (3, 0, 0), (3, 1, 0)],
-        ants=[((2, 0, 0), 3)],
-    )
-    assert bounds_of(world).shortest() == ExpectedEpisode(12, 5, 1)
-    value, outcome = bounds_of(world).optimal(0.5, 6)
-    assert outcome == ExpectedEpisode((12 + 0) / 2, (5 + 6) / 2, 0.5)
-    food_1 = -1 - 0.5 + 0.25 * 1 + 0.125 * 10
-    cycle = (-1 - 0.5) / (1 - 0.125)
-    food_2 = -1 + 0.25 * cycle
-    assert value == pytest.approx(3 + 0.5 * (food_1 + food_2) / 2)
-
-
-@pytest.mark.parametrize(
-    ("levels", "rewards"),
-    [
-        # Left, forward, right: what is at least half of the strongest is seen as a trail.
-        ((1, 2, 0), [1, 1, 0]),
-        ((1, 3, 0), [0, 1, 0]),
-        ((2, 4, 3), [1, 1, 1]),
-        ((0, 0, 0), [0, 0, 0]),
-        ((1_000_000_000, 499_999_999, 500_000_000), [1, 0, 1]),
-    ],
-)
-def test_moves_onto_trails_earn_what_the_ant_sees(
-    levels: tuple[int, int, int], rewards: list[int]
-) -> None:
-    # The ant looks up the x axis from the middle of its row: x + 1 is ahead, z + 1 and y + 1 lead
-    # to its left and right, in normal form.
-    ahead = [(2, 0, 1), (2, 0, 0), (2, 1, 0)]
-    world = World(
-        (3, 3, 3),
-        (0, 2, 2),
-        trails=list(zip(ahead, levels, strict=True)),
-        ants=[((1, 0, 0), 0)],
-    )
-    # With a discount of 0 what the ant earns at once is all that counts.
-    value, _ = bounds_of(world).optimal(0.0, 1)
-    assert value == max(rewards)
-    bounds = bounds_of(world)
-    assert bounds._rewards[:, bounds._start].tolist() == [*rewards, -1, -1]
-
-
-def test_a_food_behind_another_is_never_reached() -> None:
-    # Queen, ant and two foods in a row: the second only comes into view when the first is gone,
-    # and then the ant carries.
-    world = World((4, 1, 1), (0, 0, 0), [(2, 0, 0), (3, 0, 0)], ants=[((1, 0, 0), 0)])
-    alone = World((4, 1, 1), (0, 0, 0), [(2, 0, 0)], [(3, 0, 0)], ants=[((1, 0, 0), 0)])
-    value, outcome = bounds_of(world).optimal(0.9, 10)
-    assert (pytest.approx(value), outcome) == bounds_of(alone).optimal(0.9, 10)
-    assert bounds_of(world).shortest() == bounds_of(alone).shortest() == ExpectedEpisode(13, 2, 1)
-
-
-@pytest.mark.parametrize("foods", [[], [(5, 0, 0)]])
-def test_a_world_without_a_delivery_has_no_shortest_one(foods: list) -> None:
-    # The only food, if any, lies behind a rock.
-    world = World((6, 1, 1), (0, 0, 0), foods, [(3, 0, 0)], ants=[((1, 0, 0), 0)])
-    assert bounds_of(world).shortest() is None
-    _, outcome = bounds_of(world).optimal(0.9, 10)
-    assert outcome.deliveries == 0
-
-
 def test_equal_actions_are_decided_by_the_lowest_number() -> None:
     # Three cells in a row: the ant in the middle between queen and rock can only fail, for ever.
     world = World((3, 1, 1), (0, 0, 0), obstacles=[(2, 0, 0)], ants=[((1, 0, 0), 0)])
     assert bounds_of(world).optimal(0.0, 7) == (-1, ExpectedEpisode(-7, 7, 0))
     assert bounds_of(world).optimal(0.9, 7) == (pytest.approx(-10), ExpectedEpisode(-7, 7, 0))
-
-
-def test_an_ant_that_is_not_listed_starts_by_the_seed_zero() -> None:
-    placed = World((4, 3, 2), (0, 0, 0), [(3, 0, 0)])
-    [cell], [heading] = placed.start(seed=0)
-    listed = World(
-        (4, 3, 2), (0, 0, 0), [(3, 0, 0)], ants=[(placed.grid.cells(cell).tolist(), int(heading))]
-    )
-    assert bounds_of(placed).optimal(0.9, 50) == bounds_of(listed).optimal(0.9, 50)
 
 
 @pytest.mark.parametrize("discount", [-0.1, 1.0, 1.5, float("nan")])

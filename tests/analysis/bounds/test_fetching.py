@@ -79,14 +79,6 @@ def test_a_dead_end_is_found() -> None:
     assert not delivering_pays(faces_queen)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(20))
-def test_the_best_policies_of_far_piles_deliver(seed: int) -> None:
-    bounds = EpisodeBounds(worlds.build("far_piles", seed), FETCHING)
-    for discount in (0.9, 0.999):
-        assert bounds.optimal(discount, 600)[1] == bounds.shortest()
-
-
 def outcomes(world: World) -> list[float]:
     """The return and steps of the shortest delivery, and the best returns at 0.9 and 0.99."""
     bounds = EpisodeBounds(world, Task())

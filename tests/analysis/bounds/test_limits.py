@@ -60,41 +60,6 @@ def test_three_ticks_a_cycle_are_reached() -> None:
     assert colony.record.deliveries == 6
 
 
-def test_a_neighbour_cell_serves_once_in_three_ticks() -> None:
-    """Two ants in turn at the one cell beside the food: pick up, leave, enter, pick up."""
-    world = World(
-        (4, 2, 1), (3, 0, 0), [(0, 0, 0)], [(0, 1, 0)], ants=[((1, 0, 0), 3), ((2, 0, 0), 3)]
-    )
-    colony = begun(world, regrowth=0)
-    act(colony, PICK_UP, FORWARD)  # the second is blocked
-    assert [ant.carries for ant in colony.ants.values()] == [True, False]
-    act(colony, RIGHT, FORWARD)  # the first leaves to (2, 1, 0); its cell was full at the start
-    act(colony, GIVE, FORWARD)
-    act(colony, GIVE, PICK_UP)
-    assert [ant.carries for ant in colony.ants.values()][1]
-    assert colony.record.ticks == 4
-
-
-def test_what_the_queen_can_take() -> None:
-    assert limits_of(World((8, 8, 8), (0, 0, 0))).queen == pytest.approx(2000)
-    walled = World((8, 8, 8), (0, 0, 0), obstacles=[(1, 0, 0), (0, 1, 0), (0, 0, 1)])
-    assert limits_of(walled).queen == pytest.approx(1000)
-
-
-def test_without_a_way_nothing_is_possible() -> None:
-    shut = World((6, 1, 1), (0, 0, 0), [(5, 0, 0)], [(3, 0, 0)])
-    limits = limits_of(shut)
-    assert math.isinf(limits.cycle)
-    assert limits.deliveries(3) == 0
-
-
-def test_ants_turn_on_the_spot_as_in_a_crowd() -> None:
-    """Between food and queen in the open, a turn leads away, unless another ant is in the way."""
-    assert limits_of(World((9, 9, 9), (0, 0, 0), [(2, 0, 0)])).cycle == 3
-    # Farther away, the way there and back is a loop anyway.
-    assert limits_of(World((9, 9, 9), (0, 0, 0), [(6, 0, 0)])).cycle == 12
-
-
 def test_with_right_of_way_a_neighbour_cell_serves_once_in_two_ticks() -> None:
     """Ants with food push the one that has just given; the reference does it."""
     assert limits_of(worlds.paper(), foraging()).queen == 1500

@@ -275,7 +275,7 @@ def levels_seen(world, ant):
         shows = world.ground.get(cell) == EMPTY and turn not in ant.misread
         index *= 4
         for number, name in enumerate("aB"):
-            index += (shows and world.fields[name].level(cell) >= 1) << number
+            index += (shows and world.pheromones[name].level(cell) >= 1) << number
     return index
 
 

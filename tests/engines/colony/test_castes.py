@@ -8,6 +8,7 @@ from scipy.stats import kstest, lognorm, truncnorm, uniform
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, task, worlds
 from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.interventions import SetTask
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
 from taichi_ants.task import Labour, Threshold
 from taichi_ants.task.caste import chances_in, numbers_in
@@ -161,13 +162,13 @@ def test_numbers_of_castes_change_in_an_episode():
     castes = {"a": {"share": 0.5, "threshold": 3.0}, "b": {"threshold": 9.0}}
     colony = follows(Task(castes=castes, labour=LABOUR), ants=5)
     interventions = Interventions(colony)
-    interventions.set_task(colony.task.replace(castes={"a": {"lifespan": None, "epsilon": 1.0}}))
+    interventions.apply(SetTask((("castes.a.lifespan", None), ("castes.a.epsilon", 1.0))))
     assert colony.arrays["castes"][0].tolist() == [1.0, -1.0]
-    interventions.set_task(colony.task.replace(labour={"demand": 2.0}))
+    interventions.apply(SetTask((("labour.demand", 2.0),)))
     assert colony.arrays["labour"][0] == 2.0
-    for fixed in ({"share": 0.25}, {"policy": "random"}, {"threshold": Threshold()}):
+    for name, fixed in (("share", 0.25), ("policy", "random"), ("threshold", Threshold())):
         with pytest.raises(AntsError, match="cannot change the share, ants, nest or policy"):
-            interventions.set_task(colony.task.replace(castes={"a": fixed}))
+            interventions.apply(SetTask(((f"castes.a.{name}", fixed),)))
 
 
 @pytest.mark.parametrize(
@@ -205,7 +206,7 @@ def test_what_does_not_fit_is_refused(make, says):
         ({"castes": {"a": {"share": 1, "ants": 2}}}, "give one of them"),
         ({"castes": {"a": {"threshold": 3}}}, "leave it out unless `task.labour.rule`"),
         ({"labour": "thresholds"}, "ants have no thresholds; add a caste"),
-        ({"castes": {"a": {"lays": ["trail", "home"]}}}, "it must be one of all, none, trail"),
+        ({"castes": {"a": {"lays": "trail, home"}}}, "it must be one of all, none, trail"),
         ({"castes": {"a": {"k": 2}}}, "because `task.choice.rule` is 'greedy'"),
         ({"castes": {"a": {"homing_cue": "home"}}}, "it must be one of compass, trail"),
         ({"castes": {"a": {"threshold": -1}}}, r"`task\.castes\.a\.threshold\.value` is -1"),

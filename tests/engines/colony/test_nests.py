@@ -166,10 +166,10 @@ def test_changes_by_hand_keep_nests_and_kinds_in_later_episodes():
     colony = two_nests(capacity=20)
     interventions = Interventions(colony)
     colony.begin_episode()
-    Place("food", [[5, 3, 0]], kind="sugar").apply(interventions)
-    Place("queen", [[6, 6, 0]], nest=1).apply(interventions)
-    AddAnts(number=3, nest=1).apply(interventions)
-    RemoveAnts(share=1.0, nest=0).apply(interventions)
+    interventions.apply(Place("food", [[5, 3, 0]], kind="sugar"))
+    interventions.apply(Place("queen", [[6, 6, 0]], nest=1))
+    interventions.apply(AddAnts(number=3, nest=1))
+    interventions.apply(RemoveAnts(share=1.0, nest=0))
     assert colony.nests[colony.living].tolist() == [1] * 9
     interventions.begin_episode()
     world = colony.worlds[0]
@@ -183,7 +183,7 @@ def test_changes_by_hand_keep_nests_and_kinds_in_later_episodes():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-(lambda: AddAnts(number=1, nest=2).apply(Interventions(begun())), "nest is 2"),
+(lambda: Interventions(begun()).apply(AddAnts(number=1, nest=2)), "nest` is 2"),
 (lambda: begun().run(1, 5, protocol=[At(2, remove_ants={"share": 0.5, "nest": 2})]),
          "`remove_ants.nest` is 2, but the world has 2 nests"),
 (lambda: Colony(WORLD, Task(), TRAINING), "the world has 2 kinds of food, but the task 1"),

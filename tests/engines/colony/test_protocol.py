@@ -17,7 +17,7 @@ from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.engines.layout import note_best_actions
-from taichi_ants.interventions import from_dict
+from taichi_ants.interventions import Place, RemoveAnts, from_dict
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.protocol import At, Every, When
 from taichi_ants.reference import ReferenceColony
@@ -182,17 +182,17 @@ def test_interventions_by_hand_change_the_worlds_that_are_named():
     colony.begin_episode()
     cell = [3, 3, 0]
     for one in ({"clear": [cell]}, {"place": {"what": "rock", "cells": [cell]}}):
-        from_dict(one).apply(Interventions(colony, worlds=[0, 2]))
-    from_dict({"remove_ants": 4}).apply(Interventions(colony, worlds=[1]))
+        Interventions(colony, worlds=[0, 2]).apply(from_dict(one))
+    Interventions(colony, worlds=[1]).apply(from_dict({"remove_ants": 4}))
     grounds = [int(colony.snapshot(w).ground[colony.grid.index(cell)]) for w in range(3)]
     assert grounds == [OBSTACLE, EMPTY, OBSTACLE]
     assert colony.living.sum(axis=1).tolist() == [20, 16, 20]
     for one in ({"epsilon": 0.5}, {"task": {"pheromone.level": 9}}, {"ants": 5}):
         with pytest.raises(AntsError, match="the worlds of a colony share"):
-            from_dict(one).apply(Interventions(colony, worlds=[1]))
+            Interventions(colony, worlds=[1]).apply(from_dict(one))
     everywhere = Interventions(colony)
-    everywhere.put(colony.grid.index([[4, 4, 0]]), FOOD)
-    from_dict({"ants": 9}).apply(everywhere)
+    everywhere.apply(Place("food", [[4, 4, 0]]))
+    everywhere.apply(from_dict({"ants": 9}))
     everywhere.begin_episode()
     assert colony.living.sum(axis=1).tolist() == [9, 9, 9]
     # Later episodes start with the changes of the object that begins them.
@@ -209,7 +209,7 @@ def test_kernels_rely_on_stored_best_actions_and_on_slots_without_gaps(schedule)
     colony.begin_episode()
     for number in (7, 3, 0):
         colony.tick(40)
-        Interventions(colony, [1]).remove_ants(colony.cells[1, [number, 20]])
+        Interventions(colony, [1]).apply(RemoveAnts(cells=colony.cells[1, [number, 20]].tolist()))
         ants = 30 - np.array([[0], [30 - np.count_nonzero(colony.living[1])]])
         assert np.array_equal(colony.living, np.arange(30) < ants)
         stored = colony.arrays["q"].copy()

@@ -20,7 +20,6 @@ from taichi_ants import (
     trace_training,
     train,
 )
-from taichi_ants.reference.ants import starts
 from taichi_ants.settings import declared
 from taichi_ants.task import Pheromone, Task, observations
 from taichi_ants.task.constants import DEPOSIT_LEVEL
@@ -228,13 +227,3 @@ def test_paper_states_are_the_papers_states_whatever_the_observation():
         assert np.array_equal(other.paper_states, papers.states)
         assert np.array_equal(other.next_paper_states, papers.next_states)
         assert not np.array_equal(other.states, papers.states)
-
-
-def test_starts_of_ants():
-    """Where ants start, listed or placed by the seed."""
-    for seed in range(200):
-        world = random_world(seed + 500)
-        cells, headings = world.start(seed)
-        [(cell, heading)] = starts(world, seed)
-        assert tuple(world.grid.cells(cells[0])) == cell
-        assert headings[0] == heading

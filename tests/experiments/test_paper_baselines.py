@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plain_runs import rollout
-
-from taichi_ants.analysis.bounds import episodes
-from taichi_ants.analysis.bounds.baselines import (
+from paper.baselines import (
     bound_rows,
     policy_rows,
 )
+from plain_runs import rollout
+
+from taichi_ants.analysis.bounds import episodes
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Rewards, Task
 from taichi_ants.worlds import paper
@@ -87,34 +87,6 @@ def test_all_baselines_are_paid_what_the_task_pays() -> None:
     rows = bound_rows(paper(), task, (0.9,)) + policy_rows(paper(), task, evaluate, [0], 1)
     returns = {row.return_mean for row in rows if row.baseline != "random policy"}
     assert returns == {32 * 2 + 30 + 100}
-
-
-def test_trails_evaporate_as_in_training() -> None:
-    calls = []
-
-    def record(*arguments: Any, **options: Any) -> SimpleNamespace:
-        calls.append(options["task"].evaporation_in_evaluation)
-        return evaluate(*arguments, **options)
-
-    task = Task(evaporation_in_training=True, evaporation_in_evaluation=False)
-    policy_rows(paper(), task, record, [0], 1, 40)
-    [row] = bound_rows(paper(), task, (0.9,), 40)
-    assert row.note.startswith("trails evaporate in training, but exact bounds require")
-    assert calls == [True, True]
-
-
-def test_a_discount_of_one_has_no_figures_but_a_reason() -> None:
-    rows = bound_rows(paper(), Task(), [1.0, 0.5, 1], 40)
-    assert [row.discount for row in rows] == [None, 1.0, 0.5]
-    assert rows[1].return_mean is None
-    assert "may be unbounded" in rows[1].note
-
-
-def test_a_world_without_a_delivery_says_so() -> None:
-    world = World((3, 1, 1), (0, 0, 0), ants=[((1, 0, 0), 0)])
-    [shortest] = bound_rows(world, Task(), [], 10)
-    assert shortest.return_mean is None
-    assert shortest.note == "no delivery is possible"
 
 
 def test_of_a_world_that_is_too_large_no_bounds_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
