@@ -90,9 +90,14 @@ class Colony(ColonyState):
         self._start()
 
     def _start(self, which: Which = ALL) -> None:
-        """Reset some worlds, and let their ants observe."""
+        """Reset worlds to the start of an episode, and let their ants observe.
+
+        Tables, memories and random streams stay.
+        """
         self.ready[which] = False
-        self.begin(which)
+        self.count_deliveries(which)
+        self.set_learning_rate(self.learning_rate)
+        self.reset(which)
         self._stepper.launch(self, "begin")
         self.ready[which] = True
 

@@ -28,13 +28,7 @@ import numpy as np
 
 from taichi_ants import files
 from taichi_ants.engines.colony import food_sources
-from taichi_ants.engines.colony.layout import (
-    ANT_STANDS,
-    FoodRow,
-    NestRow,
-    Stage,
-    WorldRow,
-)
+from taichi_ants.engines.colony.layout import ANT_STANDS, FoodRow, NestRow, Stage, WorldRow
 from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.errors import AntsError, count, entries_of, shown
 from taichi_ants.grid.constants import (

@@ -6,6 +6,7 @@ The state is in NumPy arrays, which kernels change in place. Only this package r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, Literal, TypeVar, get_args
@@ -70,8 +71,6 @@ ALL = slice(None)  # selects all worlds; a bool (W,) selects some
 _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
 # Unused settings for colonies with given actions, in which ants neither choose nor learn.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
-
-_UNKNOWN = ("number", "action", "executed", "next_action")  # columns that are -1 at first
 
 _KIND = Kind("colony", 14, "Colony.save")
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
@@ -310,24 +309,20 @@ class ColonyState:
         tables = self.arrays["q"].reshape(
             len(self.seeds), self.owners, -1, self.task.n_states, ROW
         )[:, :, 0, :, :N_ACTIONS]
-        shape = len(self.seeds), *self._owner_axes, self.task.n_states, N_ACTIONS
+        shape = len(self.seeds), *self._axes.values(), self.task.n_states, N_ACTIONS
         return tables.reshape(shape).copy()
 
     @property
-    def _owner_axes(self) -> tuple[int, ...]:
-        """The axes of the tables of a world: of slots, or of several nests and castes."""
-        return (self.capacity,) if self.one_a_slot else tuple(self._group_axes.values())
-
-    @property
-    def _group_axes(self) -> dict[str, int]:
-        """The numbers of nests and castes, if there are several."""
+    def _axes(self) -> dict[str, int]:
+        """The numbers of slots that own tables, or else of nests and castes if several do."""
         axes = {"nest": self.n_nests, "caste": self.model.n_groups // self.n_nests}
-        return {name: n for name, n in axes.items() if n > 1}
+        several = {name: n for name, n in axes.items() if n > 1}
+        return {"slot": self.capacity} if self.one_a_slot else several
 
     @property
     def owners(self) -> int:
         """The number of tables in each world: one for each slot, or for each nest and caste."""
-        return self.capacity if self.one_a_slot else self.model.n_groups
+        return math.prod(self._axes.values())
 
     @property
     def tables_of_ants(self) -> np.ndarray:
@@ -385,7 +380,10 @@ class ColonyState:
         ground = self.part("ground", world).copy()
         ground[ant_cells] = EMPTY
         carries = self.carrying[world, living]
-        fields = {name: self._levels(world, name) for name in (TRAIL, *self.task.fields)}
+        fields = {}
+        for name in (TRAIL, *self.task.fields):
+            stored, clock = self.stored_trail(world, name)
+            fields[name] = np.maximum(stored - stored.dtype.type(clock), 0)
         of_ants, of_cells = np.zeros(len(ant_cells), np.int32), np.zeros(self.grid.size, np.uint8)
         if self.n_kinds > 1:
             of_ants = self._kinds[world, living].astype(np.int32)
@@ -419,11 +417,6 @@ class ColonyState:
             counts=counts,
             world=self.worlds[world],
         )
-
-    def _levels(self, world: int, field: str) -> np.ndarray:
-        """Return the levels of a pheromone in a world."""
-        stored, clock = self.stored_trail(world, field)
-        return np.maximum(stored - stored.dtype.type(clock), 0)
 
     def stored_trail(self, world: int = 0, field: str = TRAIL) -> tuple[np.ndarray, int]:
         """Return a copy of the trail of world number `world` as kernels store it, and the clock.
@@ -504,10 +497,8 @@ class ColonyState:
         if n > self.n_food_sources:
             self._read_start(n)
 
-    def begin(self, which: Which = ALL) -> None:
-        """Reset worlds to the start of an episode; tables, memories and random streams stay."""
-        self.count_deliveries(which)
-        self.set_learning_rate(self.learning_rate)
+    def reset(self, which: Which) -> None:
+        """Reset the arrays of worlds, and begin the random streams of their next episode."""
         self._set_to_start(which)
         stale = np.zeros_like(self.changed)
         stale[which] = self.changed[which]
@@ -703,28 +694,23 @@ class ColonyState:
     def _tables(self, q_values: np.ndarray | None) -> np.ndarray:
         """Return the tables of all worlds or slots, with `q_values` or the initial value."""
         n_worlds, slots, n_states = len(self.seeds), self.owners, self.task.n_states
-        own = self.one_a_slot or slots > 1
         q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
         q[..., :N_ACTIONS] = self.training.initial_q
         if q_values is not None:
-            leading, form = q_values.shape[:-2], f"{n_states}, {N_ACTIONS}"
-            axes = (n_worlds, *self._owner_axes)
-            if leading not in ((), (n_worlds,)) and not (own and leading == axes):
-                groups = self._group_axes
-                forms: list[tuple[str, tuple[int, ...]]] = [("world", ())]
-                forms += [(" and ".join(groups), tuple(groups.values()))] if groups else []
-                if self.sharing == "independent" or not (self.learns or self.task.castes):
-                    forms.append(("slot", (self.capacity,)))
-                several = [
-                    f"({', '.join(map(str, (n_worlds, *more)))}, {form}) for one table per {name}"
-                    for name, more in forms
+            leading, form, axes = q_values.shape[:-2], f"{n_states}, {N_ACTIONS}", self._axes
+            known = {(): 1, (n_worlds,): 1, (n_worlds, *axes.values()): slots}
+            if leading not in known:
+                forms = {"world": (n_worlds,), " and ".join(axes): (n_worlds, *axes.values())}
+                listed = [
+                    f"({', '.join(map(str, axis))}, {form}) for one table per {owner}"
+                    for owner, axis in forms.items()
+                    if owner
                 ]
                 raise AntsError(
-                    f"q_values has shape {q_values.shape}; give ({form}), {', or '.join(several)}."
+                    f"q_values has shape {q_values.shape}; give ({form}), {', or '.join(listed)}."
                 )
-            n_given = [] if not leading else [n_worlds, slots if leading == axes and own else 1]
-            given = q_values.reshape(*n_given, 1, n_states, N_ACTIONS)
-            q[..., :N_ACTIONS] = given
+            given = (n_worlds, known[leading]) if leading else ()
+            q[..., :N_ACTIONS] = q_values.reshape(*given, 1, n_states, N_ACTIONS)
         for number, (name, caste) in enumerate(self.task.castes.items()):
             if caste.policy is not None:
                 path = f"`task.castes.{name}.policy`"
@@ -874,11 +860,10 @@ class ColonyState:
         """
         runtime.start(threads, arch)  # first, because its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):
-            given = facts["training"]
-            training = None if given is None else TrainingConfig(**given)
+            training = facts["training"] and TrainingConfig(**facts["training"])
             if training is not None:
                 learners.get(training.learner)
-            worlds = [World.from_dict(one) for one in facts["worlds"]]
+            worlds = [World.from_dict(world) for world in facts["worlds"]]
             task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
             if options["sharing"] == "frozen" and training is not None:
                 # Tables of the right shape, which the arrays of the file replace.
@@ -887,19 +872,14 @@ class ColonyState:
             # Policies of castes are in the arrays of the file; theirs may no longer exist.
             known = task.with_policies("random")
             colony = cls([worlds[w] for w in facts["world_of"]], known, training, **options)
-            colony.task = task
+            colony.task, colony.length, colony.ticks = task, facts["length"], facts["ticks"]
             colony.epsilon = arguments.checked_share("epsilon", facts["epsilon"])
-            colony.set_learning_rate(
-                arguments.checked_share("learning_rate", facts["learning_rate"])
-            )
-            colony.length = checked_whole("length", facts["length"], least=0)
-            colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
+            colony.set_learning_rate(facts["learning_rate"])
             if facts["food_sources"] != colony.n_food_sources:
                 colony.make_room_for_food(facts["food_sources"])
             for name in colony.stored:
-                array, kept = colony.arrays[name], arrays[f"array_{name}"]
-                as_array(name, kept, array.dtype, array.shape)
-                array[:] = kept
+                array = colony.arrays[name]
+                array[:] = as_array(name, arrays[f"array_{name}"], array.dtype, array.shape)
             colony.ready = colony.arrays["episodes"] >= 0
         return colony
 

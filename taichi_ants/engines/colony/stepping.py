@@ -87,7 +87,14 @@ class Stepper:
         # The caller may have reset Taichi, or forked the process.
         runtime.check_on_cpu(runtime.start(), "colonies run")
         if name not in self._launches:
-            self._launches[name] = self._prepared(state, name)
+            from taichi_ants.engines.arguments import Launch
+            from taichi_ants.engines.colony import kernels, learning
+
+            variant = kernels.variant(state.model)
+            kernel_of = partial(kernels.ticks, variant, state.schedule == "by_chunk")
+            if name != "ticks":
+                kernel_of = partial(kernels.once, variant, getattr(learning, name))
+            self._launches[name] = Launch(kernel_of)
         self._launches[name]({**kernel_numbers(state), **state.arrays})
 
     def _share_ticks(self, state: ColonyState, n: int) -> None:
@@ -110,17 +117,6 @@ class Stepper:
                 orders[[Order.PARTS, Order.FIRST]] = 1, opened - GAVE_UP + 1
                 barrier[:] = 0
                 self.launch(state, "ticks")
-
-    @staticmethod
-    def _prepared(state: ColonyState, name: str) -> Any:
-        """Return a kernel for repeated launches."""
-        from taichi_ants.engines.arguments import Launch
-        from taichi_ants.engines.colony import kernels, learning
-
-        variant = kernels.variant(state.model)
-        if name == "ticks":
-            return Launch(partial(kernels.ticks, variant, state.schedule == "by_chunk"))
-        return Launch(partial(kernels.once, variant, getattr(learning, name)))
 
 
 def threads_for(n_worlds: int) -> int:
