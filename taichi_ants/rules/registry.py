@@ -82,9 +82,8 @@ def _arguments(
             more = "".join(f", {start}FIELD" for start in KINDS[kind].of_fields)
             raise AntsError(
                 f"the rule {name!r} has the argument `{argument}`, which is not an input of the "
-                f"kind {kind!r}; choose from {', '.join(KINDS[kind].inputs)}{more}, or give it a "
-                "default that is a whole number (int) or a number (float), which makes it a "
-                "parameter."
+                f"kind {kind!r}; choose from {', '.join(KINDS[kind].inputs)}{more}, or make it a "
+                "parameter by a default of type int or float."
             )
     settings: Any = make_dataclass(name, parameters, bases=(Parameters,), frozen=True)
     settings.path = f"task.rules.{name}"

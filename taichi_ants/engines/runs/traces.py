@@ -208,8 +208,8 @@ def record_steps(
     """Yield the steps of the next episodes of many runs, in pieces, and update the runs' state.
 
     A piece is the columns `TRACE`, with episodes numbered from 0 in each run, and further arrays
-    (n,): "runs", the number of the run, int64; "chances", the probability of each action, float64;
-    and "td_errors", float32, of learners. Pieces of a run are in order. If `tables` is given, the
+    (n,). They are "runs", the number of the run, int64; "chances", the probability of each action,
+    float64; and "td_errors", float32, of learners. Pieces of a run are in order. If `tables` is given, the
     kernel writes the table after each step of the piece into it.
     """
     runtime.start()
