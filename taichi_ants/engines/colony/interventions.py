@@ -22,13 +22,14 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from taichi_ants import files
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, FoodRow, NestRow, Stage, WorldRow
+from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.errors import AntsError, count, entries_of, shown
 from taichi_ants.grid.constants import (
@@ -60,9 +61,6 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import World
-
-if TYPE_CHECKING:
-    from taichi_ants.engines.colony.colony import Colony
 
 Change = Iterator[None]  # yields once, between its checks and its effects
 REACH = 8  # cells; twice the radius of the largest brush on the live page
@@ -417,7 +415,7 @@ class Interventions:
     """
 
     def __init__(
-        self, colony: Colony, worlds: Sequence[int] | None = None, lasting: bool = True
+        self, colony: TickingColony, worlds: Sequence[int] | None = None, lasting: bool = True
     ) -> None:
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from taichi_ants import measures
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.engines.colony.stepping import Stepper
+from taichi_ants.engines.colony.stepping import Stepper, TickingColony
 from taichi_ants.errors import AntsError
 from taichi_ants.interventions import SetPolicy
 from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
-
-if TYPE_CHECKING:
-    from taichi_ants.engines.colony.colony import Colony
 
 
 class Timetable:
@@ -28,7 +25,7 @@ class Timetable:
         AntsError: An event cannot happen in an episode of `length` ticks, or in this colony.
     """
 
-    def __init__(self, colony: Colony, protocol: Any, length: int) -> None:
+    def __init__(self, colony: TickingColony, protocol: Any, length: int) -> None:
         self._colony, self._events, self._length = colony, checked_protocol(protocol), length
         self._at: dict[int, list[tuple[int, ProtocolEvent]]] = {}  # by tick: indices and events
         for number, event in enumerate(self._events):
