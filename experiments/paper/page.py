@@ -113,8 +113,8 @@ def begin(
     def wait() -> Seen:
         with progress_bar("pictures") as progress:
             results = process.results_of(calls, progress)
-        players = [Player(*captions[code], results[code]) for code in sorted(first)]
-        sheet = Picture(*captions["sheet"], results["sheet"]) if "sheet" in results else None
+        players = [Player(*captions[code], recording=results[code]) for code in sorted(first)]
+        sheet = Picture(*captions["sheet"], image=results["sheet"]) if "sheet" in results else None
         return Seen(results["drawings"], players, sheet)
 
     return wait
