@@ -87,8 +87,8 @@ def planned(module: str, settings: Namespace) -> Planned:
     plugin, arch, file = settings.plugin, settings.arch, module if module[-3:] == ".py" else None
     codes = {"plugin": read_plugin(plugin), "study": read_plugin(file)}
     with recorded() as read:
-        load_plugin(plugin)
-        loaded: Any = load_plugin(file) or import_module(module)
+        load_plugin(plugin, codes["plugin"])
+        loaded: Any = load_plugin(file, codes["study"]) or import_module(module)
         plan = loaded.plan(options)
         salt = [f"study {Path(module).stem}"]
         if file is not None:

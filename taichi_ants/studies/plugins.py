@@ -71,8 +71,10 @@ def _needed(folder: Path, path: Path, content: bytes) -> Iterator[Path]:
         yield from needed
 
 
-def load_plugin(path: str | None) -> Any:
+def load_plugin(path: str | None, code: Code | None = None) -> Any:
     """Return the module of a Python file, after running it; do nothing for None.
+
+    `code` is what `read_plugin` has returned for it, if it was called before.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.
@@ -86,7 +88,7 @@ def load_plugin(path: str | None) -> Any:
         sys.meta_path.insert(0, _finder)
     module = importlib.util.module_from_spec(spec)
     try:
-        for file in [*map(Path, read_plugin(path))][1:]:
+        for file in [*map(Path, code or read_plugin(path))][1:]:
             is_beside = file.parent == Path(path).parent
             if file.suffix == ".py" and (is_beside or file.stem == "__init__"):
                 _let_import(file)
