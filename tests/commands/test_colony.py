@@ -281,15 +281,3 @@ def test_help_is_quick_and_needs_no_taichi(arguments, expected, tmp_path):
     assert done.stdout.endswith("heavy: []\n")
     for word in expected:
         assert f"  {word}" in done.stdout
-
-
-def test_the_guides_example_works(capsys):
-    """The Python of docs/colony.md."""
-    guide = (EXPERIMENTS.parent / "docs" / "colony.md").read_text("utf-8")
-    code = guide.split("```python\n")[1].split("```")[0]  # the others are tried elsewhere
-    exec(compile(code, "colony.md", "exec"), {})
-    *training, copies = capsys.readouterr().out.splitlines()
-    deliveries = np.array(" ".join(training).strip("[]").split(), int)
-    assert deliveries.shape == (50,)
-    assert deliveries[-10:].mean() > deliveries[:10].mean()
-    assert len(copies.strip("[]").split()) == 4

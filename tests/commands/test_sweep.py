@@ -478,17 +478,6 @@ def test_settings_of_a_training_that_does_not_happen_are_refused():
             sweep_of({**one, **training})
 
 
-def test_a_training_is_allowed_if_a_part_of_the_sweep_learns():
-    both = [{"policy": ["random"], "episodes": 0}, {"episodes": 3}]
-    file = {"kind": "colony", "measures": ["deliveries"], "ticks": 20, "vary": both}
-    training = {"learner": "sarsa", "learning_rate": 0.1, "discount": 0.9, "epsilon_decay": 0.9}
-    follows, learns = sweep_of({**file, "training": {**training, "epsilon": 0.3}}).study.points
-    assert (follows.exploration, learns.exploration) == (0.0, 0.01)
-    varied = [{**both[0], "training.epsilon": [0.1, 0.2]}, {**both[1], "training.epsilon": 0.1}]
-    with pytest.raises(AntsError, match=r"^training\.epsilon has no effect"):
-        sweep_of({**file, "training": training, "vary": varied})
-
-
 @pytest.mark.parametrize(
     ("more", "message"),
     [

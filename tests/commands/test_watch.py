@@ -14,8 +14,7 @@ from pathlib import Path
 import pytest
 from command_lines import call, load, promptly, run, start
 
-from taichi_ants import AntsError, save_policy
-from taichi_ants.learners.policies import trail_follower
+from taichi_ants import AntsError
 from taichi_ants.live import server
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.server import SessionServer
@@ -109,14 +108,6 @@ def test_a_saved_session_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[s
     status, _, said = call("watch", ["--session", tmp_path / "none.npz"], capsys)
     assert status == 2
     assert "none.npz" in said
-
-
-def test_policies_have_the_names_of_their_files(tmp_path: Path) -> None:
-    save_policy(tmp_path / "mine.npz", trail_follower(), {})
-    named = load("watch").policies([str(tmp_path / "mine.npz")])
-    assert {"mine", "foraging", "queueing", "far_piles"} <= named.keys()
-    with pytest.raises(AntsError, match="nothing"):
-        load("watch").policies([str(tmp_path / "nothing.npz")])
 
 
 def test_a_browser_is_opened_on_a_private_file(monkeypatch: pytest.MonkeyPatch) -> None:

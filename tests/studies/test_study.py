@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import shutil
 from dataclasses import fields, make_dataclass, replace
 
 import numpy as np
@@ -95,17 +94,6 @@ def test_blocks_cover_all_runs_once_with_one_task_and_learner_each(study):
     assert sorted(done, key=str) == sorted(itertools.product(POINTS, SEEDS), key=str)
 
 
-def test_blocks_are_cut_evenly_and_limited_in_runs():
-    short = replace(POINTS[0], episodes=1, max_steps=1, rollouts=1)
-    sizes = [len(at) for _, at in runs((short,), range(9000)).blocks(np.ones((1, 9000), bool))]
-    assert sizes == [4500, 4500]
-    long = replace(POINTS[0], episodes=10**6, max_steps=10**7)
-    blocks = runs((long,), (0, 1)).blocks(np.ones((1, 2), bool))
-    assert [len(at) for _, at in blocks] == [1, 1]
-    usual = RunPoint(paper(), Task(), SARSA)
-    assert usual.runs_of_a_block == pytest.approx(833)
-
-
 def test_a_study_of_runs_is_training_and_evaluation(study, tmp_path):
     shares = []
     outcomes = outcomes_of(study, tmp_path, progress=shares.append)
@@ -179,19 +167,6 @@ def test_shards_have_equal_work_and_keep_points_with_their_tables(shards):
 COPIES = replace(ALONE, ants=4, episodes=0, after=ALONE)
 
 
-def test_shards_in_any_order_fill_one_folder_or_several(tmp_path):
-    study, plain = colonies((COPIES, ALONE)), tmp_path / "plain"
-    expected = outcomes_of(study, plain)
-    for number in (2, 1):
-        run(study, Store(tmp_path / "one"), shard=(number, 2))
-        run(study, Store(tmp_path / f"part {number}"), shard=(number, 2))
-        shutil.copytree(tmp_path / f"part {number}", tmp_path / "merged", dirs_exist_ok=True)
-    for place in ("one", "merged"):
-        before = files_in(tmp_path / place)
-        assert same(outcomes_of(study, tmp_path / place), expected)
-        assert files_in(tmp_path / place) == before  # nothing was missing
-
-
 def only_deliveries(points, seeds, outcome):
     return {"total": outcome["deliveries"].sum(axis=2)}
 
@@ -204,19 +179,6 @@ def test_tables_that_were_not_kept_are_learned_again_for_the_points_that_need_th
     assert same(outcomes_of(grown, tmp_path), expected)
     with np.load(files_in(tmp_path)[0]) as file:
         assert {"total", "about"} <= set(file.files) <= {"total", "q_values", "about"}
-
-
-def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
-    """With worlds of their own, with one for all, from a pool, and going on from others."""
-    one, each = replace(ALONE, world=WORLDS[0]), ALONE
-    points = (each, replace(each, ants=4, after=each), replace(one, ants=3, sharing="independent"))
-    points += (replace(one, ants=4, episodes=0, after=one), replace(each, pool=WORLDS))
-    study, found = colonies(points, (3, 5, 8, 1, 0)), []
-    for size in (kinds_of_points._NUMBERS_OF_A_BLOCK, 8_000):
-        monkeypatch.setattr(kinds_of_points, "_NUMBERS_OF_A_BLOCK", size)
-        found.append(outcomes_of(study, tmp_path / str(size)))
-    assert same(*found)
-    assert len(files_in(tmp_path / "8000")) == 2 * 3 + 3 + 5 + 3 + 3 + 3 - 3
 
 
 def test_a_block_of_colonies_is_limited_in_memory(monkeypatch):
