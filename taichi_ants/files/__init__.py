@@ -130,8 +130,6 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
     """
     expect("path", path, str, os.PathLike)
     try:
-        if "\0" in os.fspath(path):
-            raise OSError("it contains a null character")
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         no_wait = getattr(os, "O_NONBLOCK", 0)
         copy = inputs.place_of(path)
@@ -143,7 +141,9 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
                 raise OSError(f"it has {status.st_size} bytes, and at most {most} are allowed")
             inputs.note(path, file)
             yield file
-    except (OSError, UnicodeEncodeError) as error:
+    except AntsError:
+        raise
+    except (OSError, ValueError) as error:  # ValueError: a name that no file has
         raise AntsError(
             f"cannot read {named(path)}: {_reason(error)}; name another file."
         ) from error
@@ -176,8 +176,6 @@ def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Pat
     """
     folder = Path(path)
     with writing(chosen or path):
-        if "\0" in str(path):
-            raise OSError("it contains a null character")
         folder.mkdir(parents=True, exist_ok=True)
         _try_to_write(folder)
     return folder
@@ -188,7 +186,9 @@ def writing(path: PathLike) -> Iterator[None]:
     """Yield once, and turn errors of the operating system into an AntsError with the path."""
     try:
         yield
-    except (OSError, UnicodeError) as error:
+    except AntsError:
+        raise
+    except (OSError, ValueError) as error:  # ValueError: a name that no file has
         full = getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
         more = "free some space and run the command again, or " if full else ""
         raise AntsError(
@@ -199,8 +199,6 @@ def writing(path: PathLike) -> Iterator[None]:
 def _target_of(path: PathLike) -> Path:
     """Return the file at the end of all links; raise AntsError if it exists and is not regular."""
     expect("path", path, str, os.PathLike)
-    if "\0" in os.fspath(path):
-        raise OSError("it contains a null character")
     target = Path(os.path.realpath(path))
     # Replacing a device, a pipe or a folder would destroy it or fail.
     if str(path).endswith(os.sep) or (target.exists() and not target.is_file()):

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError
 
 MOST_BYTES = 1 << 36  # the largest unpacked size of a file
 _CHECKSUM = "checksum"  # the array with the checksum of all other arrays
@@ -73,12 +73,8 @@ def read(
             if not (foreign if written is None else str(written) == _checksum(arrays)):
                 raise ValueError("the checksum is missing or differs")
             return arrays
-        except (AntsError, OSError):
+        except (AntsError, OSError, MemoryError):
             raise
-        except MemoryError as error:
-            raise AntsError(
-                f"{name} needs more memory than is available; name a smaller file."
-            ) from error
         except Exception as error:  # zipfile, zlib, struct and tokenize raise many kinds
             raise AntsError(
                 f"{name} is damaged, or not an .npz file of this version; write it again, or name "
@@ -149,15 +145,10 @@ class Kind:
             kind, version = facts["kind"], facts["version"]
         except (AttributeError, KeyError, ValueError, TypeError, RecursionError):
             kind = version = None
-        if kind != self.name:
+        if (kind, version) != (self.name, self.version):
             raise AntsError(
-                f"{files.named(path)} does not contain a {self.name} of this version; name a file "
-                f"that {self.writer} wrote."
-            )
-        if version != self.version:
-            raise AntsError(
-                f"{files.named(path)} contains a {self.name} in version {shown(version)} of its "
-                f"format; only version {self.version} can be read, so create the file again."
+                f"{files.named(path)} does not contain a {self.name} in version {self.version} of "
+                f"its format; name a file that {self.writer} wrote."
             )
         with self.building(path):
             yield arrays, facts

@@ -15,7 +15,7 @@ from taichi_ants import AntsError
 
 KINDS = (
     *("policy", "policy of others", "training result", "data set", "colony", "session", "block"),
-    *("manifest", "map", "sweep", "table of others"),
+    *("manifest", "map", "sweep"),
 )
 CHECKED = KINDS[:8]
 MOST_GROWTH = 64  # MiB of memory
