@@ -72,9 +72,7 @@ def _needed(folder: Path, path: Path, content: bytes) -> Iterator[Path]:
 
 
 def load_plugin(path: str | None, code: Code | None = None) -> Any:
-    """Return the module of a Python file, after running it; do nothing for None.
-
-    `code` is what `read_plugin` has returned for it, if it was called before.
+    """Return the module of a Python file, after running it, or None; `code` is as read before.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.

@@ -68,8 +68,8 @@ def replay(
     if point.after is not None:
         after = store.read([key_of(point.after, *study.salt)], [seed], (Q_VALUES,))
         learned = after[Q_VALUES][0]
-    has_table = point.episodes and getattr(point, "sharing", "shared") == "shared"
-    every = [*dict.fromkeys((*study.arrays, *[Q_VALUES] * bool(has_table)))]
+    learns = point.episodes and getattr(point, "sharing", "shared") == "shared"
+    every = [*dict.fromkeys((*study.arrays, *[Q_VALUES] * bool(learns)))]
     again = outcome_of([point], [seed], learned, study.measure, every, where, None)
     differ = [
         name

@@ -94,6 +94,17 @@ def test_blocks_cover_all_runs_once_with_one_task_and_learner_each(study):
     assert sorted(done, key=str) == sorted(itertools.product(POINTS, SEEDS), key=str)
 
 
+def test_blocks_are_cut_evenly_and_limited_in_runs():
+    short = replace(POINTS[0], episodes=1, max_steps=1, rollouts=1)
+    sizes = [len(at) for _, at in runs((short,), range(9000)).blocks(np.ones((1, 9000), bool))]
+    assert sizes == [4500, 4500]
+    long = replace(POINTS[0], episodes=10**6, max_steps=10**7)
+    blocks = runs((long,), (0, 1)).blocks(np.ones((1, 2), bool))
+    assert [len(at) for _, at in blocks] == [1, 1]
+    usual = RunPoint(paper(), Task(), SARSA)
+    assert usual.runs_of_a_block == pytest.approx(833)
+
+
 def test_a_study_of_runs_is_training_and_evaluation(study, tmp_path):
     shares = []
     outcomes = outcomes_of(study, tmp_path, progress=shares.append)
