@@ -75,21 +75,11 @@ def begin(
 ) -> Callable[[], Seen]:
     """Return a function that waits for all figures, recordings and, if `renders`, animations.
 
-    This process follows the policies, because it has compiled the kernel. The second process draws
-    the animations or, without them, the figures.
+    This process follows the policies, because it has compiled the kernel. The second process begins
+    with the recordings; this one draws figures, and then what the second has not begun.
     """
     played = [example.played() for example in examples]
-    draw = partial if renders else process.begin
-    calls: dict[Any, process.Begun] = {
-        "figures": draw(figures.save_all, comparison, baselines, folder / "figures")
-    }
-    for (row, run, point, *_), episode in zip(examples, played if renders else (), strict=False):
-        path = files.check_writable_folder(folder / "renders")
-        path /= f"{example_name(comparison, row, run)}.gif"
-        # The animation shows the name of the episode next to the world.
-        named = replace(episode, name=BEHAVIOURS[comparison.behaviours[row, run]])
-        title = f"{comparison.rows[row].variant.label}, {point.task.delivery}"
-        calls[path] = process.begin(render, path, named, title)
+    calls: dict[Any, process.Begun] = {}
     first: dict[int, tuple[Example, Episode]] = {}
     for example, episode in zip(examples, played, strict=True):
         first.setdefault(int(comparison.behaviours[example.row, example.run]), (example, episode))
@@ -108,6 +98,15 @@ def begin(
             title, task = f"{variant.label}: policy", example.point.task
             captions["sheet"] = "", f"The policy of an ant: {whose}"
             calls["sheet"] = process.begin(policy_sheet, example.q_values, title, task=task)
+    draw = partial if renders else process.begin
+    calls["figures"] = draw(figures.save_all, comparison, baselines, folder / "figures")
+    for (row, run, point, *_), episode in zip(examples, played if renders else (), strict=False):
+        path = files.check_writable_folder(folder / "renders")
+        path /= f"{example_name(comparison, row, run)}.gif"
+        # The animation shows the name of the episode next to the world.
+        named = replace(episode, name=BEHAVIOURS[comparison.behaviours[row, run]])
+        title = f"{comparison.rows[row].variant.label}, {point.task.delivery}"
+        calls[path] = process.begin(render, path, named, title)
     calls["drawings"] = draw(figures.for_page, comparison, baselines)
 
     def wait() -> Seen:
