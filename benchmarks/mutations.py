@@ -88,7 +88,7 @@ MUTATIONS = [
     ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
     ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
     ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
-    ("engines/colony/kernels.py", "features.carriers_follow if", "outbound if", CHOICE),
+    ("task/model.py", "followed = carriers_follow if", "followed = outbound if", CHOICE),
     ("measures/tidy.py", "column.startswith(f", "column == (f", RESULTS_OF_RUNS),
     ("rendering/rasteriser.py", "ANTS[snapshot.ant_nests]", "ANTS[0 * snapshot.ant_nests]", RASTER),
     (
@@ -182,14 +182,14 @@ MUTATIONS = [
     ("task/rules/vision.py", "2 * level >= ti.max", "2 * level > ti.max", COLONY),
     ("task/rules/vision.py", "ti.max(strongest, 1)", "ti.max(strongest, 0)", RUNS),
     ("task/rules/vision.py", "nearer >> 1 & 1", "nearer >> 2 & 1", RUNS),
-    ("task/observations/queues.py", "code = 6", "code = 5", COLONY),
+    ("task/observations/built_in.py", "code = 6", "code = 5", COLONY),
     (
-        "task/observations/trail_levels.py",
+        "task/observations/built_in.py",
         "level < view.strongest -",
         "level <= view.strongest -",
         "tests/engines/test_views.py",
     ),
-    ("task/observations/ants_seen.py", "view.ants[k] != 0", "view.ants[k] == 1", COLONY),
+    ("task/observations/built_in.py", "5 * index + code", "5 * index + view.codes[k]", COLONY),
     ("task/rewards.py", "[[Event.ENTERED_EMPTY, Event.PUSHED]]", "[Event.ENTERED_EMPTY]", TRAFFIC),
     # Engines.
     ("engines/runs/kernels.py", "step + 1 == a.max_steps", "step == a.max_steps", RUNS),
@@ -281,7 +281,6 @@ MUTATIONS = [
     ("files/archives.py", "if size > most:", "if size > 2 * most:", ARCHIVES),
     ("files/archives.py", "if version != self.version:", "if version < 0:", ARCHIVES),
     ("files/__init__.py", 'with open(temporary, "wb")', 'with open(target, "wb")', FILES),
-    ("files/__init__.py", "st_mtime > _ABANDONED", "st_mtime >= 0", FILES),
     ("files/__init__.py", "None if v != v else v", "v", FILES),
     (
         "studies/store.py",
@@ -362,7 +361,7 @@ MUTATIONS = [
         COLONY,
     ),
     ("measures/built_in.py", 'ratio(counts["carried"]', 'ratio(counts["moves"]', MEASURES),
-    ("measures/paths.py", "float(reached.min()) - 1)", "float(reached.min()))", MEASURES),
+    ("measures/built_in.py", "float(steps - 1)", "float(steps)", MEASURES),
     ("measures/built_in.py", "level, n in pairs)", "level, _ in pairs for n in (1,))", MEASURES),
     ("measures/built_in.py", "log(len(levels)))", "log(len(levels) + 1))", MEASURES),
     ("measures/built_in.py", "(share - mean) ** 2", "abs(share - mean)", MEASURES),
@@ -376,14 +375,14 @@ MUTATIONS = [
     ("analysis/results.py", "- values[1])", "- values[0])", RESULTS_OF_RUNS),
     ("studies/sweep.py", "outcome[key][..., -1]", "outcome[key][..., 0]", SWEEPS),
     # Settings.
-    ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),
+    ("settings.py", "converted <= above", "converted < above", SETTINGS),
     ("settings.py", "elif value != setting.default:", "elif False:", SETTINGS),
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "changed[setting.name] = setting.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
     # Features, and what supports them.
     ("features.py", ".intersection(supports):", ":", FEATURES),
-    ("settings.py", "if value == one.default:", "if True:", FEATURES),
+    ("settings.py", "if value == setting.default:", "if True:", FEATURES),
     # Designs.
     ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),
     ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
