@@ -94,6 +94,12 @@ def steps_of(samples: list[int]) -> list[int]:
 def test_pictures_have_the_light_colours_of_pages() -> None:
     """All of them, so what holds for one holds for the other."""
     light = theme_of(0)
+    named = {
+        **{"page": colours.PAGE, "empty": colours.CELL_EMPTY, "rock": colours.CELL_OBSTACLE},
+        **{"food-floor": colours.FLOOR_FOOD, "queen-floor": colours.FLOOR_QUEEN},
+        **{"ink": colours.INK, "rule": colours.RULE, "chosen": colours.CHOSEN},
+    }
+    assert {name: light[name] for name in named} == {name: [word] for name, word in named.items()}
     assert light["queen"] + light["nests"] == colours.QUEENS.tolist()
     assert light["ant"] + light["nests"] == colours.ANTS.tolist()
     assert light["food"] + light["foods"] == colours.FOODS.tolist()
