@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,23 +30,15 @@ def never() -> bool:
     return False
 
 
-@pytest.mark.parametrize(
-    ("render", "writer", "ticks"),
-    [("a.gif", "_gif", 6), ("frames", "png", 6), ("a.png", "png", 20)],
-)
+@pytest.mark.parametrize(("render", "ticks"), [("a.gif", 6), ("a.png", 20)])
 def test_a_colony_is_saved_although_its_picture_cannot_be(
-    tmp_path, monkeypatch, render, writer, ticks
+    tmp_path, monkeypatch, render, ticks
 ) -> None:
-    error = OSError(28, "No space left on device")
-    pictures = []
+    def full(file, first, frames, fps) -> None:
+        list(islice(frames, 4))  # at the start and after 2, 4, 6 ticks
+        raise OSError(28, "No space left on device")
 
-    def fourth(*given, **options) -> bytes:  # at the start and after 2, 4, 6 ticks
-        pictures.extend(islice(given[2], 4) if writer == "_gif" else given[:1])
-        if len(pictures) == 4 or render == "a.png":
-            raise error
-        return b""
-
-    monkeypatch.setattr(writers, writer, fourth)
+    monkeypatch.setitem(writers._ENCODERS, Path(render).suffix, full)
     colony = begun()
     save = str(tmp_path / "keep.npz")
     with pytest.raises((AntsError, OSError), match="o space left on device"):
