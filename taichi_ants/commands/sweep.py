@@ -12,6 +12,8 @@ from pathlib import Path
 
 from taichi_ants.studies import command_line
 
+STOPPED = command_line.AGAIN
+
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
@@ -26,16 +28,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return command_line.with_folder(settings, f"sweep-{settings.file.stem}")
 
 
-def sweep(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
-    from taichi_ants.files.tables import check_parquet
-    from taichi_ants.studies.command import run_study
+    from taichi_ants.studies.command import planned, run_study
 
-    if settings.parquet:
-        check_parquet()
-    run_study(settings, "taichi_ants.studies.sweep")
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
-    command_line.run_command(lambda: sweep(parse_arguments(arguments)), command_line.AGAIN)
+    run_study(settings, planned("taichi_ants.studies.sweep", settings))

@@ -9,7 +9,14 @@ import pytest
 from named_states import parse_state
 
 from taichi_ants import Task, rollout
-from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, DELIVERS, OTHER, WALKS, classify
+from taichi_ants.analysis.behaviour import (
+    BEHAVIOURS,
+    CIRCLES,
+    DELIVERS,
+    OTHER,
+    WALKS,
+    classify,
+)
 from taichi_ants.learners import policies
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT, SEES_CUE
 from taichi_ants.task.states import state_from_index

@@ -14,7 +14,7 @@ from taichi_ants.protocol import At, Every
 from taichi_ants.report.odd import Model, described
 from taichi_ants.settings import MISSING, all_of, declared, flat
 from taichi_ants.studies.points import ColonyPoint, FixedPolicy, RunPoint, settings_of
-from taichi_ants.studies.sweep import read_sweep, sweep_of
+from taichi_ants.studies.sweep import plan, sweep_of
 from taichi_ants.task import Field, Food, Task, foraging
 
 SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99)
@@ -108,18 +108,6 @@ def test_every_setting_that_differs_has_its_value(seed):
         assert found.get(name) == (text if is_used else None), name
 
 
-def test_the_headings_are_those_of_the_protocol():
-    headings = [
-        *("1. Purpose and patterns", "2. Entities, state variables and scales"),
-        *("3. Process overview and scheduling", "4. Design concepts"),
-        *("4.1 Basic principles", "4.2 Emergence", "4.3 Adaptation", "4.4 Objectives"),
-        *("4.5 Learning", "4.6 Prediction", "4.7 Sensing", "4.8 Interaction", "4.9 Stochasticity"),
-        *("4.10 Collectives", "4.11 Observation"),
-        *("5. Initialization", "6. Input data", "7. Submodels"),
-    ]
-    assert re.findall("^##+ (.*)$", of_task(Task()), re.M) == headings
-
-
 def test_parameters_have_the_unit_and_the_meaning_of_their_declaration():
     fades = {"evaporation": "exponential", "half_life": 7.5}
     task = foraging().replace(pheromone=fades, fields={"home": {}}, homing_cue="home")
@@ -185,14 +173,6 @@ def test_a_study_without_learning_has_no_parameters_of_learning():
     assert "| `entropy.a` | entropy of each pheromone field" in text
 
 
-def test_the_trail_has_no_view_if_nobody_follows_it():
-    task = Task(fields={"a": {}}).replace(outbound_cue="a")
-    assert "task.pheromone.view" not in values_in(of_task(task))
-    assert values_in(of_task(task))["task.fields.a.view"] == "half"
-    follows = task.replace(castes={"one": {"outbound_cue": "trail"}})
-    assert values_in(of_task(follows))["task.pheromone.view"] == "half"
-
-
 def test_carriers_follow_has_its_value():
     task = Task().replace(
         choice={"rule": "deneubourg", "carriers_follow": "home"}, fields={"home": {}}
@@ -254,7 +234,7 @@ def test_rows_of_tables_have_as_many_cells_as_their_heads():
 
 def test_the_guide_shows_a_part_of_a_real_description():
     path = ROOT / "experiments/sweeps/trails.toml"
-    text = of_sweep(read_sweep(path), files.tomllib.loads(path.read_text()))
+    text = of_sweep(plan({"file": path}), files.tomllib.loads(path.read_text()))
     guide = (ROOT / "docs/archives.md").read_text("utf-8")
     shown = guide.split("```markdown\n")[1].split("```")[0]
     assert len(shown) > 500

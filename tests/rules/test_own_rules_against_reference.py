@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from random_choices import NOISE
 from random_colonies import random_colony
-from same_colonies import assert_equal
+from same_colonies import equal_ticks
 
 from taichi_ants import Colony
 from taichi_ants.reference import ReferenceColony
@@ -34,7 +34,7 @@ MODELS = {
         {"sharing": "independent", "learner": "n_step_sarsa", "fields": "a", "changes": True},
     ),
 }
-MARKS = {"weber": (), "shaped": pytest.mark.optimised, "blocked weber": pytest.mark.long}
+MARKS = {"weber": (), "blocked weber": pytest.mark.long}
 MARKED = [pytest.param(name, marks=MARKS.get(name, pytest.mark.slow)) for name in MODELS]
 
 
@@ -55,15 +55,7 @@ def test_every_tick_with_rules_of_users(model):
         colony = Colony(*given, **options)
         plain = ReferenceColony(*given, **options)
         for ticks in (12, 9):
-            colony.begin_episode(ticks)
-            plain.begin_episode()
-            assert_equal(colony, plain)
-            for tick in range(ticks):
-                if not plain.over:
-                    colony.tick()
-                    plain.tick(last=tick == ticks - 1)
-                    assert_equal(colony, plain)
-            colony.end_episode()
-            plain.end_episode()
+            for _ in equal_ticks(colony, plain, ticks):
+                pass
             delivered += plain.records[-1].deliveries
     assert delivered > 0

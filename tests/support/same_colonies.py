@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants import Colony
+from taichi_ants import Colony, World
 from taichi_ants.engines.colony.layout import FoodSourceRow, NestRow, WorldRow
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import FOOD
@@ -58,6 +58,21 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     _assert_equal_records(colony, plain, world)
 
 
+def equal_ticks(colony: Colony, plain: ReferenceColony, ticks: int, world: World | None = None):
+    """Run an episode of a colony and of its reference, equal at each tick; yield after each."""
+    colony.begin_episode(ticks, world)
+    plain.begin_episode(world)
+    assert_equal(colony, plain)
+    for tick in range(ticks):
+        if not plain.over:
+            colony.tick()
+            plain.tick(last=tick == ticks - 1)
+            assert_equal(colony, plain)
+            yield
+    colony.end_episode()
+    plain.end_episode()
+
+
 def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) -> None:
     """Compare the episode's counters, the store, the food sources, and the size of the model."""
     outcome, record, row = colony.outcome(), plain.record, colony.arrays["worlds"][:, world]
@@ -72,7 +87,7 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     assert {(int(n), int(k)): int(apart[n, k]) for n, k in np.argwhere(apart)} == record.delivered
     by_caste = dict(enumerate(outcome.caste_deliveries[0, world].tolist()))
     assert {caste: n for caste, n in by_caste.items() if n} == record.by_caste
-    assert colony.stimuli[world].tolist() == plain.stimuli
+    assert colony.stimuli[world].tolist() == plain.world.stimuli
     first = world * colony.n_food_sources
     food_sources = colony.arrays["food_sources"][:, first : first + row[WorldRow.FOOD_SOURCES]]
     theirs = plain.food_sources.food_sources[: food_sources.shape[1]]

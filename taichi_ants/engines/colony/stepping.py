@@ -114,8 +114,8 @@ class Stepper:
     @staticmethod
     def _prepared(state: ColonyState, name: str) -> Any:
         """Return a kernel for repeated launches."""
-        from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.colony import kernels, learning
+        from taichi_ants.engines.launch import Launch
 
         variant = kernels.variant(state.model)
         if name == "ticks":

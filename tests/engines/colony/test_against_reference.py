@@ -10,7 +10,7 @@ from random_castes import drawn_castes
 from random_choices import NOISE
 from random_colonies import RandomColony, random_colony, with_nests
 from random_rewards import random_rewards
-from same_colonies import assert_equal
+from same_colonies import assert_equal, equal_ticks
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, learners, worlds
 from taichi_ants.reference import ReferenceColony
@@ -56,9 +56,7 @@ KERNELS = [
 
 
 def both(drawn: RandomColony) -> tuple[Colony, ReferenceColony]:
-    rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
-    given = (drawn.world, drawn.task, drawn.training, drawn.seed)
-    return Colony(*given, **rules), ReferenceColony(*given, **rules)
+    return Colony(*drawn.model, **drawn.options), ReferenceColony(*drawn.model, **drawn.options)
 
 
 def without_rocks(world: World) -> World:
@@ -67,22 +65,18 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK = (0, 1, 10, 13)
+QUICK, LONG = (0, 1, 10, 13), (2, 3, 6, 7, 8, 14)
 SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
 
-OPTIMISED = ("dyna_q", "independent", "ants_seen", False)
+
+def marked(kernels, quick, long):
+    """Kernels with marks; golden hashes show that the results of the longest stay."""
+    later = [pytest.mark.long if k in long else pytest.mark.slow for k in range(len(kernels))]
+    marks = [() if k in quick else mark for k, mark in enumerate(later)]
+    return [pytest.param(one, marks=mark) for one, mark in zip(kernels, marks, strict=True)]
 
 
-def marks_of(k: int) -> list[pytest.MarkDecorator]:
-    if KERNELS[k] == OPTIMISED:
-        return [pytest.mark.optimised]
-    return [] if k in QUICK else [pytest.mark.slow]
-
-
-MARKED = [pytest.param(one, marks=marks_of(k)) for k, one in enumerate(KERNELS)]
-
-
-@pytest.mark.parametrize("kernel", MARKED, ids=str)
+@pytest.mark.parametrize("kernel", marked(KERNELS, QUICK, LONG), ids=str)
 def test_every_tick_in_crowded_micro_worlds(kernel):
     """Two episodes each: something goes on between them, in every other case in another world."""
     learner, sharing, observation, dense, *rules = kernel
@@ -102,16 +96,8 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
         )
         colony, plain = both(drawn)
         for ticks, world in ((11, None), (8, without_rocks(drawn.world) if seed % 2 else None)):
-            colony.begin_episode(ticks, world)
-            plain.begin_episode(world)
-            assert_equal(colony, plain)
-            for tick in range(ticks):
-                if not plain.over:
-                    colony.tick()
-                    plain.tick(last=tick == ticks - 1)
-                    assert_equal(colony, plain)
-            colony.end_episode()
-            plain.end_episode()
+            for _ in equal_ticks(colony, plain, ticks, world):
+                pass
             record = plain.records[-1]
             happened += [
                 record.births > 0,
@@ -133,9 +119,6 @@ NESTS = [
     ("sarsa_lambda", "independent", "ants_seen", False, "blocking", "half", 4, 1, True),
     ("q_learning", "frozen", "other_nest_ants", False, "right_of_way", "half", 2, 2, True),
 ]
-QUICK_NESTS = [
-    one if k in (0, 3) else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(NESTS)
-]
 
 
 def with_strangers(view):
@@ -149,7 +132,7 @@ def with_strangers(view):
     return index
 
 
-@pytest.mark.parametrize("kernel", QUICK_NESTS, ids=str)
+@pytest.mark.parametrize("kernel", marked(NESTS, (0, 3), (2,)), ids=str)
 def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers):
     """Deliveries by nest and kind, loads, regrowth, births by nest: two episodes each."""
     learner, sharing, observation, dense, traffic, view, nests, kinds, loads = kernel
@@ -174,16 +157,8 @@ def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers)
             continue  # kernels are compiled for a number of nests
         colony, plain = both(drawn)
         for ticks in (13, 9):
-            colony.begin_episode(ticks)
-            plain.begin_episode()
-            assert_equal(colony, plain)
-            for tick in range(ticks):
-                if not plain.over:
-                    colony.tick()
-                    plain.tick(last=tick == ticks - 1)
-                    assert_equal(colony, plain)
-            colony.end_episode()
-            plain.end_episode()
+            for _ in equal_ticks(colony, plain, ticks):
+                pass
             record, nests_of = plain.records[-1], [nest for nest, _ in plain.records[-1].delivered]
             happened += [
                 record.births > 0,
@@ -206,13 +181,9 @@ CASTES = [
     ("sarsa_lambda", "independent", "ants_seen", False, "right_of_way", "half", 2, True, 2, {}),
     ("q_learning", "frozen", "queues", False, "following", UNDER, 2, True, 1, SOFT),
 ]  # fmt: skip
-QUICK_CASTES = [
-    one if k in (0, 2) else pytest.param(one, marks=pytest.mark.slow)
-    for k, one in enumerate(CASTES)
-]
 
 
-@pytest.mark.parametrize("kernel", QUICK_CASTES, ids=str)
+@pytest.mark.parametrize("kernel", marked(CASTES, (0, 2), (1, 3)), ids=str)
 def test_every_tick_with_castes_and_division_of_labour(kernel):
     """Numbers, tables, cues and deposits of castes, births, thresholds and idle ants."""
     learner, sharing, observation, dense, traffic, view, castes, labour, nests, more = kernel
@@ -237,19 +208,12 @@ def test_every_tick_with_castes_and_division_of_labour(kernel):
             continue
         colony, plain = both(drawn)
         for ticks in (13, 9):
-            colony.begin_episode(ticks)
-            plain.begin_episode()
-            assert_equal(colony, plain)
-            for tick in range(ticks):
-                if not plain.over:
-                    idle = colony.idle & colony.living
-                    colony.tick()
-                    plain.tick(last=tick == ticks - 1)
-                    assert_equal(colony, plain)
-                    now = colony.idle & colony.living
+            idle = None
+            for _ in equal_ticks(colony, plain, ticks):
+                now = colony.idle & colony.living
+                if idle is not None:
                     happened[4:] += [(idle & ~now).any(), (now & ~idle).any()]
-            colony.end_episode()
-            plain.end_episode()
+                idle = now
             record = plain.records[-1]
             several = len({ant.caste for ant in plain.ants.values()}) == castes
             happened[:4] += [record.births > 0, record.deaths > 0, record.deliveries > 0, several]
@@ -292,18 +256,12 @@ def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
         drawn = random_colony(seed, fields="aB", changes=True, **rules)
         drawn = replace(drawn, task=replace(drawn.task, observation="levels"), q_values=None)
         colony, plain = both(drawn)
-        colony.begin_episode(20)
-        plain.begin_episode()
-        for tick in range(20):
-            if not plain.over:
-                colony.tick()
-                plain.tick(last=tick == 19)
-                assert_equal(colony, plain)
-                for ant in plain.ants.values():
-                    misread, ant.misread = ant.misread, {}
-                    hidden += levels_seen(plain.world, ant) != ant.state
-                    shown += ant.state % 64 > 0
-                    ant.misread = misread
+        for _ in equal_ticks(colony, plain, 20):
+            for ant in plain.ants.values():
+                misread, ant.misread = ant.misread, {}
+                hidden += levels_seen(plain.world, ant) != ant.state
+                shown += ant.state % 64 > 0
+                ant.misread = misread
     assert shown > 100
     assert (hidden > 20) == (noise == "misread")
 
