@@ -102,8 +102,7 @@ class Caste(Settings, path="task.castes.NAME"):
         Setting("number of ants in each nest at the start, instead of a share", most=1 << 24),
     ] = None
     nest: Annotated[
-        Number,
-        Setting("number of the nest that has the caste; off: each nest", most=MAX_NESTS - 1),
+        Number, Setting("number of the nest that has the caste; off: each nest", most=MAX_NESTS - 1)
     ] = None
     policy: Annotated[
         str | None,

@@ -163,8 +163,7 @@ class Task(Settings, path="task"):
         Setting("kinds of food, in the order of their numbers in worlds; colonies only"),
     ] = field(default_factory=Named)
     castes: Annotated[
-        Named[Caste],
-        Setting("castes of ants, in the order of their numbers; colonies only"),
+        Named[Caste], Setting("castes of ants, in the order of their numbers; colonies only")
     ] = field(default_factory=Named)
     labour: Annotated[Labour, Setting("rule by which ants start and stop foraging")] = Labour()
     reward: Annotated[

@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from taichi_ants import Colony, World
 from taichi_ants.engines.colony.layout import FoodSourceRow, NestRow, WorldRow
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import FOOD
+
+
+def every_tick(
+    colony: Colony, plain: ReferenceColony, *episodes: tuple[int, World | None]
+) -> Iterator[None]:
+    """Yield after each tick of episodes (ticks, world), in which a colony equals the reference."""
+    for ticks, world in episodes:
+        colony.begin_episode(ticks, world)
+        plain.begin_episode(world)
+        assert_equal(colony, plain)
+        for tick in range(ticks):
+            if not plain.over:
+                colony.tick()
+                plain.tick(last=tick == ticks - 1)
+                assert_equal(colony, plain)
+                yield
+        colony.end_episode()
+        plain.end_episode()
 
 
 def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None:
@@ -56,21 +76,6 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     assert np.array_equal(colony.q_values[world], plain.q_values)
     assert int(arrays["queen_streams"][world]) == plain.queen_stream.state
     _assert_equal_records(colony, plain, world)
-
-
-def equal_ticks(colony: Colony, plain: ReferenceColony, ticks: int, world: World | None = None):
-    """Run an episode of a colony and of its reference, equal at each tick; yield after each."""
-    colony.begin_episode(ticks, world)
-    plain.begin_episode(world)
-    assert_equal(colony, plain)
-    for tick in range(ticks):
-        if not plain.over:
-            colony.tick()
-            plain.tick(last=tick == ticks - 1)
-            assert_equal(colony, plain)
-            yield
-    colony.end_episode()
-    plain.end_episode()
 
 
 def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) -> None:

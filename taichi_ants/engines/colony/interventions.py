@@ -29,13 +29,8 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
-from taichi_ants.engines.colony.layout import (
-    ANT_STANDS,
-    FoodRow,
-    NestRow,
-    Stage,
-    WorldRow,
-)
+from taichi_ants.engines.colony.layout import ANT_STANDS, FoodRow, NestRow, Stage, WorldRow
+from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.errors import AntsError, count, entries_of, shown
 from taichi_ants.grid.constants import (
@@ -422,7 +417,7 @@ class Interventions:
     """
 
     def __init__(
-        self, colony: Any, worlds: Sequence[int] | None = None, lasting: bool = True
+        self, colony: TickingColony, worlds: Sequence[int] | None = None, lasting: bool = True
     ) -> None:
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None

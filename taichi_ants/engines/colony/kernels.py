@@ -16,7 +16,14 @@ from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
 from taichi_ants.engines.colony import columns, learning, life, own_inputs, steps, trail
-from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, Stage, WorldRow
+from taichi_ants.engines.colony.layout import (
+    GAVE_UP,
+    Barrier,
+    Order,
+    Stage,
+    WorldRow,
+    array_of,
+)
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
@@ -48,7 +55,6 @@ class Variant:
         self.own_reward = model.reward_rule and own[model.reward_rule].pay
         deposits = [rule and own[rule].lay for rule in model.deposit_rules]
         evaporations = [rule and own[rule].evaporate for rule in model.evaporation_rules]
-        # The arguments of `trail.pheromone_of` by number.
         self.pheromones = tuple(
             zip(model.dense_by_number, model.views, deposits, evaporations, strict=True)
         )
@@ -64,7 +70,21 @@ class Variant:
 
     def field(self, c: Any, number: int) -> trail.PheromoneArrays:
         """Return the arrays and numbers of a pheromone; 0 is the trail."""
-        return trail.pheromone_of(c, number, *self.pheromones[number])
+        (dense, view, deposit, evaporation), end = (
+            self.pheromones[number],
+            f"_{number}" * (number > 0),
+        )
+        return trail.PheromoneArrays(
+            dense,
+            view == "half",
+            view == "strongest_under_carriers",
+            getattr(c, array_of(number, dense)),
+            getattr(c, f"spare{end}") if dense else None,
+            *(getattr(c, name + end) for name in trail.NUMBERS),
+            deposited_when=getattr(c, f"deposited_when{end}") if number else None,
+            own_deposit=deposit,
+            own_evaporation=evaporation,
+        )
 
     def dense_fields(self, c: Any) -> list[trail.PheromoneArrays]:
         """Return the arrays and numbers of the dense pheromones."""

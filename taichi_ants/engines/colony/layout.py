@@ -2,40 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum, auto
+from typing import NamedTuple
 
 import numpy as np
 
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
+from taichi_ants.task.model import Model
 
-# Columns are arrays with one entry for each slot. Small values that each tick uses take one byte,
-# which is a quarter of the memory traffic.
-_INTEGERS = (
-    "cell",
-    "carried",  # ticks since the pick-up of its food, or, if a field needs it, without food
-    "number",  # -1 in a slot that was never used in this episode
-    "want",  # the cell to enter or to take food from, else its own; later its previous cell
-    "state",  # the state index, unless it is the paper's state (it is not if ants misread cells)
-    "age",  # in ticks, if ants are born or die
-    "reward",  # of the last action, if rewards are by your own rule
-)
-_BYTES = (
-    "heading",
-    "carries",
-    "stage",  # a `Stage`
-    "paper_state",  # the paper's state, which decides about actions and rewards
-    "event",  # the result of the last action, an `Event`
-    "action",  # the last action, -1 before the first one; or the next one, if actions are given
-    "executed",  # the last action as executed, if actions slip; else it is `action`
-    "next_action",  # the next action if it is drawn already, else -1; for learners that draw ahead
-    "nest",  # the number of its nest, with several nests
-    "kind",  # the kind of the last food that it picked up, with several kinds
-    "caste",  # the number of its caste, with castes
-    "idle",  # 1 if it does not forage, with `Labour`
-)
-_FLOATS = ("threshold",)  # the response threshold of its ant, with `Labour`
-COLUMNS: dict[type, tuple[str, ...]] = {np.int32: _INTEGERS, np.int8: _BYTES, np.float32: _FLOATS}
-ALL_COLUMNS = (*_INTEGERS, *_BYTES, *_FLOATS)
+
+class Column(NamedTuple):
+    """An array with an entry for each slot: its value at the start, and the models that use it."""
+
+    dtype: type
+    start: int = 0
+    is_used: Callable[[Model], bool] = lambda model: True
+
+
+# Small values that each tick uses take one byte, which is a quarter of the memory traffic.
+COLUMNS = {
+    "cell": Column(np.int32),
+    # Ticks since the pick-up of its food, or, if a field needs it, without food.
+    "carried": Column(np.int32),
+    "number": Column(np.int32, -1),  # -1 in a slot that was never used in this episode
+    # The cell to enter or to take food from, else its own; later its previous cell.
+    "want": Column(np.int32),
+    # The state index, unless it is the paper's state.
+    "state": Column(np.int32, 0, lambda model: not model.sees_paper_state),
+    "age": Column(np.int32, 0, lambda model: model.ants_change),  # in ticks
+    # The reward of the last action, if rewards are by your own rule.
+    "reward": Column(np.int32, 0, lambda model: model.has_own_reward),
+    "heading": Column(np.int8),
+    "carries": Column(np.int8),
+    "stage": Column(np.int8),  # a `Stage`
+    "paper_state": Column(np.int8),  # which decides about actions and rewards
+    "event": Column(np.int8),  # the result of the last action, an `Event`
+    # The last action, -1 before the first one; or the next one, if actions are given.
+    "action": Column(np.int8, -1),
+    # The last action as executed, if actions slip; else it is `action`.
+    "executed": Column(np.int8, -1, lambda model: model.slips),
+    # The next action if it is drawn already, else -1.
+    "next_action": Column(np.int8, -1, lambda model: model.draws_next_action),
+    "nest": Column(np.int8, 0, lambda model: model.n_nests > 1),
+    # The kind of the last food that it picked up.
+    "kind": Column(np.int8, 0, lambda model: model.n_kinds > 1),
+    "caste": Column(np.int8, 0, lambda model: model.n_castes > 0),
+    "idle": Column(np.int8, 0, lambda model: model.has_labour),  # 1 if it does not forage
+    "threshold": Column(np.float32, 0, lambda model: model.has_labour),  # of its response
+}
 
 
 class Stage(IntEnum):

@@ -6,6 +6,7 @@ The state is in NumPy arrays, which kernels change in place. Only this package r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, Literal, TypeVar, get_args
@@ -16,7 +17,6 @@ from taichi_ants import arguments, files, learners, runtime
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import (
-    ALL_COLUMNS,
     ANT_GROUND,
     COLUMNS,
     NESTS_BY_KINDS,
@@ -72,31 +72,25 @@ _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
 # Unused settings for colonies with given actions, in which ants neither choose nor learn.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
-_UNKNOWN = ("number", "action", "executed", "next_action")  # columns that are -1 at first
-
 _KIND = Kind("colony", 14, "Colony.save")
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 
 
-def column(name: str) -> property:
-    """Return a property: a writable view (W, capacity) of an array with an entry for each slot."""
+def column(name: str, dtype: Any = None) -> property:
+    """Return a property: a writable view (W, capacity) of an array with an entry for each slot.
+
+    With a dtype it is a copy, or zeros if this colony does not need the array.
+    """
 
     def view(state: ColonyState) -> np.ndarray:
-        return state.arrays[name].reshape(len(state.seeds), state.capacity)
-
-    return property(view)
-
-
-def column_or_zeros(name: str, dtype: Any) -> property:
-    """Return a property: a copy of a column, or zeros if this colony does not need the column."""
-
-    def copied(state: ColonyState) -> np.ndarray:
         shape = len(state.seeds), state.capacity
+        if dtype is None:
+            return state.arrays[name].reshape(shape)
         return state.arrays.get(name, np.zeros(shape, dtype)).reshape(shape).astype(dtype)
 
-    return property(copied)
+    return property(view)
 
 
 class ColonyState:
@@ -136,46 +130,40 @@ class ColonyState:
         arch: str | None = None,
         schedule: str | None = None,
     ) -> None:
-        self.task = arguments.checked_task(task, "a colony", SUPPORTS)
-        self.capacity = arguments.checked_capacity(
-            self.task, ants, capacity, start, ends_at_delivery
-        )
+        self.task = task = arguments.checked_task(task, "a colony", SUPPORTS)
+        self.capacity = arguments.checked_capacity(task, ants, capacity, start, ends_at_delivery)
         self.ants, self.start, self.ends_at_delivery = int(ants), start, bool(ends_at_delivery)
         check_one_of("sharing", sharing, SHARINGS)
         self.sharing, self.learns = sharing, sharing != "frozen"
         self.has_training = training is not None or self.learns or q_values is not None
-        needs_table = self.task.choice.needs_table
-        self.is_given_actions = needs_table and not self.has_training
-        if not self.has_training:
-            training = _NO_TRAINING
-        elif not needs_table:
+        self.is_given_actions = task.choice.needs_table and not self.has_training
+        if self.has_training and not task.choice.needs_table:
             raise AntsError(
-                f"`task.choice.rule` is {self.task.choice.rule!r}, so ants choose without action "
+                f"`task.choice.rule` is {task.choice.rule!r}, so ants choose without action "
                 f"values, but sharing is {shown(sharing)} and there is a training or q_values; set "
                 'sharing to "frozen" and training to None, and leave out q_values.'
             )
-        expect("training", training, TrainingConfig)
-        assert training is not None
-        (self.training,) = arguments.checked_configs(training)
-        follows = bool(self.task.castes) and all(one.policy for one in self.task.castes.values())
-        if not self.learns and q_values is None and self.has_training and not follows:
+        if self.has_training:
+            expect("training", training, TrainingConfig)
+        (self.training,) = arguments.checked_configs(training or _NO_TRAINING)
+        policies = [name for name, caste in task.castes.items() if caste.policy is not None]
+        follows = 0 < len(task.castes) == len(policies)
+        if self.has_training and not (self.learns or follows) and q_values is None:
             raise AntsError(
                 "sharing is 'frozen', but q_values is None; give the action values that the ants "
                 "follow, because they do not learn."
             )
         if self.learns:
-            arguments.check_learner(self.training, self.task, sharing)
+            arguments.check_learner(self.training, task, sharing)
         if self.is_given_actions:
-            others = SUPPORTS - CASTES
-            refuse_unsupported("a colony with given actions", self.task.uses(), others)
-        follow = [name for name, caste in self.task.castes.items() if caste.policy is not None]
-        if follow and sharing == "independent":
+            refuse_unsupported("a colony with given actions", task.uses(), SUPPORTS - CASTES)
+        if policies and sharing == "independent":
             raise AntsError(
-                f"`task.castes.{follow[0]}.policy` is {self.task.castes[follow[0]].policy!r}, but "
+                f"`task.castes.{policies[0]}.policy` is {task.castes[policies[0]].policy!r}, but "
                 'sharing is "independent", so each ant learns into its own table; set sharing to '
                 '"shared" or "frozen".'
             )
-        table = None if q_values is None else checked_values(q_values, self.task)
+        table = None if q_values is None else checked_values(q_values, task)
         self.seeds = arguments.checked_seeds(seeds)
         running = runtime.start(threads, arch)
         runtime.check_on_cpu(running, "colonies run")
@@ -184,25 +172,22 @@ class ColonyState:
         self.schedule, self.chunks = schedule, chunks_of(schedule, running.threads)
         worlds = checked_worlds(world, len(self.seeds), self.learns)
 
-        self.one_a_slot = sharing == "independent" or (
-            # Frozen tables by slot; those by nest have another length, see `owners`.
-            not self.learns
-            and table is not None
-            and table.ndim == 4
-            and not self.task.castes
-            and (worlds[0].n_nests == 1 or table.shape[1] != worlds[0].n_nests)
-        )
-        self.n_nests, self.n_kinds = worlds[0].n_nests, max(1, len(self.task.foods))
-        for name, caste in self.task.castes.items():
+        self.n_nests, self.n_kinds = worlds[0].n_nests, max(1, len(task.foods))
+        by_slot = not self.learns and table is not None and table.ndim == 4 and not task.castes
+        if by_slot and self.n_nests > 1:  # or by nest, see `owners`
+            assert table is not None
+            by_slot = table.shape[1] != self.n_nests
+        self.one_a_slot = by_slot or sharing == "independent"
+        for name, caste in task.castes.items():
             if caste.nest is not None and caste.nest >= self.n_nests:
                 raise AntsError(
                     f"`task.castes.{name}.nest` is {caste.nest}, but the world has "
                     f"{count(self.n_nests, 'nest')}, numbered from 0; choose one of them."
                 )
-        self.pheromones = self.task.pheromones_while(self.learns)
-        self.memory, learner = Memory(), self.model.learner
-        if learner is not None and (self.one_a_slot or self.plans_together):
-            self.memory = padded(learner.memory_for(self.training, self.task.n_states))
+        self.pheromones = task.pheromones_while(self.learns)
+        self.memory, model = Memory(), self.model
+        if model.learner is not None and (self.one_a_slot or model.plans_together):
+            self.memory = padded(model.learner.memory_for(self.training, task.n_states))
         self.arrays: Arrays = {}
         self.lay_out(worlds)
         self.arrays |= (lasting := self._lasting(table))
@@ -217,11 +202,6 @@ class ColonyState:
         learner = learners.get(self.training.learner) if self.learns else None
         own_tables, is_given = self.one_a_slot, self.is_given_actions
         return Model(self.task, self.learns, learner, own_tables, is_given, self.n_nests)
-
-    @property
-    def plans_together(self) -> bool:
-        """Whether ants share a table and a model from which they plan."""
-        return self.sharing == "shared" and learners.get(self.training.learner).plans
 
     # Views
 
@@ -270,9 +250,8 @@ class ColonyState:
     _executed, _carried, _kinds = column("executed"), column("carried"), column("kind")
     # Copies (W, capacity) of what the last ant in each slot is: the numbers of its nest and caste,
     # int32; whether it is idle, see `Labour`, bool; its response threshold, float32.
-    nests, castes = column_or_zeros("nest", np.int32), column_or_zeros("caste", np.int32)
-    idle = column_or_zeros("idle", bool)
-    thresholds = column_or_zeros("threshold", np.float32)
+    nests, castes = column("nest", np.int32), column("caste", np.int32)
+    idle, thresholds = column("idle", bool), column("threshold", np.float32)
 
     @property
     def living(self) -> np.ndarray:
@@ -299,17 +278,13 @@ class ColonyState:
         """Whether an ant is on each cell, bool (W, grid.size)."""
         return self.arrays["ground"].reshape(len(self.seeds), -1) >> 4 != 0
 
-    @property
-    def update_weights(self) -> np.ndarray:
-        """The weight of the mean of n errors in an update, by n; the last is for all larger n."""
-        return self.arrays["weights"]
-
     def update_weights_of(self, castes: np.ndarray, ants: np.ndarray) -> np.ndarray:
         """Return the weight of the mean error of several ants of a caste in an update.
 
         Arrays (n,), int and float64. Castes that do not learn have the weight 0.
         """
-        weights = self.update_weights[np.minimum(ants, len(self.update_weights) - 1)]
+        weights = self.arrays["weights"]
+        weights = weights[np.minimum(ants, len(weights) - 1)]
         if "castes" not in self.arrays:
             return weights
         own = self.arrays["caste_weights"]
@@ -321,7 +296,8 @@ class ColonyState:
     @property
     def nbytes(self) -> int:
         """The number of bytes of all arrays."""
-        return sum(array.nbytes for array in (*self.arrays.values(), *self.at_start.values()))
+        kept = self.arrays, self.at_start, self.first
+        return sum(array.nbytes for arrays in kept for array in arrays.values())
 
     @property
     def q_values(self) -> np.ndarray:
@@ -333,24 +309,20 @@ class ColonyState:
         tables = self.arrays["q"].reshape(
             len(self.seeds), self.owners, -1, self.task.n_states, ROW
         )[:, :, 0, :, :N_ACTIONS]
-        shape = len(self.seeds), *self._owner_axes, self.task.n_states, N_ACTIONS
+        shape = len(self.seeds), *self._axes.values(), self.task.n_states, N_ACTIONS
         return tables.reshape(shape).copy()
 
     @property
-    def _owner_axes(self) -> tuple[int, ...]:
-        """The axes of the tables of a world: of slots, or of several nests and castes."""
-        return (self.capacity,) if self.one_a_slot else tuple(self._group_axes.values())
-
-    @property
-    def _group_axes(self) -> dict[str, int]:
-        """The numbers of nests and castes, if there are several."""
+    def _axes(self) -> dict[str, int]:
+        """The numbers of slots that own tables, or else of nests and castes if several do."""
         axes = {"nest": self.n_nests, "caste": self.model.n_groups // self.n_nests}
-        return {name: n for name, n in axes.items() if n > 1}
+        several = {name: n for name, n in axes.items() if n > 1}
+        return {"slot": self.capacity} if self.one_a_slot else several
 
     @property
     def owners(self) -> int:
         """The number of tables in each world: one for each slot, or for each nest and caste."""
-        return self.capacity if self.one_a_slot else self.model.n_groups
+        return math.prod(self._axes.values())
 
     @property
     def tables_of_ants(self) -> np.ndarray:
@@ -381,29 +353,23 @@ class ColonyState:
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
-        arrays = {**self._counts(), **self._deliveries_apart()}
-        counts: dict[str, Any] = {name: array[None].copy() for name, array in arrays.items()}
+        counts: Any = {name: array[None].copy() for name, array in self._counts().items()}
         return ColonyEpisodes(**counts, seeds=self.seeds)
 
-    def _deliveries_apart(self) -> Arrays:
-        """Return deliveries by nest and kind of food, and by caste: int32 (W, ...)."""
-        if self.n_nests * self.n_kinds == 1:
-            apart = self.deliveries.astype(np.int32)
-        else:
-            apart = self.arrays["deliveries_by_nest_and_kind"]
-        by_caste = self.arrays.get("caste_deliveries", self.deliveries.astype(np.int32))
-        return {
-            "deliveries_by_nest_and_kind": apart.reshape(-1, self.n_nests, self.n_kinds),
-            "caste_deliveries": by_caste.reshape(len(self.seeds), -1),
-        }
-
     def _counts(self) -> Arrays:
-        """Return the counts of the episode (W,), by their names in `ColonyEpisodes`."""
-        totals, worlds = self.arrays["totals"], self.arrays["worlds"]
-        counts = {row.name.lower(): totals[row] for row in TOTALS}
-        stores = self.arrays["nests"][NestRow.STORE].reshape(len(self.seeds), -1)
-        counts["waiting_births"] = stores.sum(axis=1, dtype=np.int32)
-        return counts | {row.name.lower(): worlds[row] for row in WorldRow if row >= WorldRow.TICKS}
+        """Return the counts of the episode (W, ...), by their names in `ColonyEpisodes`."""
+        arrays, rows, n = self.arrays, self.arrays["worlds"], len(self.seeds)
+        apart = deliveries = self.deliveries.astype(np.int32)
+        if self.model.counts_by_nest_and_kind:
+            apart = arrays["deliveries_by_nest_and_kind"]
+        stores = arrays["nests"][NestRow.STORE].reshape(n, -1)
+        return {
+            **{row.name.lower(): arrays["totals"][row] for row in TOTALS},
+            "waiting_births": stores.sum(axis=1, dtype=np.int32),
+            **{row.name.lower(): rows[row] for row in WorldRow if row >= WorldRow.TICKS},
+            "deliveries_by_nest_and_kind": apart.reshape(n, self.n_nests, self.n_kinds),
+            "caste_deliveries": arrays.get("caste_deliveries", deliveries).reshape(n, -1),
+        }
 
     def snapshot(self, world: int = 0) -> Snapshot:
         """Return the present state of world number `world`; arrays are copies."""
@@ -414,18 +380,21 @@ class ColonyState:
         ground = self.part("ground", world).copy()
         ground[ant_cells] = EMPTY
         carries = self.carrying[world, living]
-        fields = {name: self._levels(world, name) for name in (TRAIL, *self.task.fields)}
+        fields = {}
+        for name in (TRAIL, *self.task.fields):
+            stored, clock = self.stored_trail(world, name)
+            fields[name] = np.maximum(stored - stored.dtype.type(clock), 0)
         of_ants, of_cells = np.zeros(len(ant_cells), np.int32), np.zeros(self.grid.size, np.uint8)
         if self.n_kinds > 1:
             of_ants = self._kinds[world, living].astype(np.int32)
             of_cells = np.where(ground == FOOD, self.part("kind_of", world), np.uint8(0))
         queens = self.arrays["nests"][NestRow.QUEEN_CELL].reshape(len(self.seeds), -1)[world]
-        counts: dict[str, Any] = {n: int(array[world]) for n, array in self._counts().items()}
-        apart = self._deliveries_apart()
-        by_nest_and_kind = apart["deliveries_by_nest_and_kind"][world]
+        of_world = {name: array[world] for name, array in self._counts().items()}
+        by_nest_and_kind = of_world.pop("deliveries_by_nest_and_kind")
+        counts: dict[str, Any] = {n: int(entry) for n, entry in of_world.items() if not entry.ndim}
         counts["nest_deliveries"] = by_nest_and_kind.sum(axis=1, dtype=np.int32)
         counts["food_deliveries"] = by_nest_and_kind.sum(axis=0, dtype=np.int32)
-        counts["caste_deliveries"] = apart["caste_deliveries"][world].copy()
+        counts["caste_deliveries"] = of_world["caste_deliveries"].copy()
         return Snapshot(
             self.grid,
             ground,
@@ -448,11 +417,6 @@ class ColonyState:
             counts=counts,
             world=self.worlds[world],
         )
-
-    def _levels(self, world: int, field: str) -> np.ndarray:
-        """Return the levels of a pheromone in a world."""
-        stored, clock = self.stored_trail(world, field)
-        return np.maximum(stored - stored.dtype.type(clock), 0)
 
     def stored_trail(self, world: int = 0, field: str = TRAIL) -> tuple[np.ndarray, int]:
         """Return a copy of the trail of world number `world` as kernels store it, and the clock.
@@ -511,24 +475,37 @@ class ColonyState:
 
     def make_room_for_food(self, n: int) -> None:
         """Reset all arrays of episodes, with room for n food sources in each world."""
-        self.n_food_sources = n
-        self.at_start = self._start_of_episode()
-        self.arrays |= (changing := self._of_episode())
-        self._changing = tuple(changing)
+        self._read_start(n)
+        slots, cells = len(self.worlds) * self.capacity, len(self.worlds) * self.grid.size
+        dense, model = self.model.dense_by_number, self.model
+        made = {
+            **{name: array.copy() for name, array in self.at_start.items()},
+            "trail": np.zeros(1 if dense[0] else cells, np.int32),
+            "level": np.zeros(cells if dense[0] else 1, np.float32),
+            **self._further_fields(cells),
+        }
+        for dtype in (np.int32, np.int8, np.float32):
+            used = [x for x, c in COLUMNS.items() if c.dtype is dtype and c.is_used(model)]
+            # One allocation, because columns at equal offsets in pages slow each other down.
+            made |= zip(used, np.zeros((len(used), slots), dtype), strict=True)
+        self._changing = tuple(made)
+        self.arrays |= made
+        self._set_to_start()
 
     def make_food_sources_fit(self, n: int) -> None:
         """Let the start of episodes have room for n food sources in each world, if it has less."""
         if n > self.n_food_sources:
-            self.n_food_sources = n
-            self.at_start = self._start_of_episode()
+            self._read_start(n)
 
-    def begin(self, which: Which = ALL) -> None:
-        """Reset worlds to the start of an episode; tables, memories and random streams stay."""
-        self.count_deliveries(which)
-        self.set_learning_rate(self.learning_rate)
-        self._set_to_start(self.arrays, which)
-        self._undo_interventions(which)
-        self._copy_worlds(self.arrays, {"streams": self.arrays["first_streams"]}, which)
+    def reset(self, which: Which) -> None:
+        """Reset the arrays of worlds, and begin the random streams of their next episode."""
+        self._set_to_start(which)
+        stale = np.zeros_like(self.changed)
+        stale[which] = self.changed[which]
+        if stale.any():
+            self._copy_worlds(self._ground_constants(), stale)
+            self.changed[stale] = False
+        self._copy_worlds({"streams": self.arrays["first_streams"]}, which)
         self.arrays["episodes"][which] += 1
 
     def count_deliveries(self, which: Which = ALL) -> None:
@@ -538,23 +515,10 @@ class ColonyState:
         self.delivered[which] += deliveries[which]
         deliveries[which] = 0
 
-    def _undo_interventions(self, which: Which) -> None:
-        """Reset the constants of those of some worlds that interventions have changed."""
-        stale = np.zeros_like(self.changed)
-        stale[which] = self.changed[which]
-        if stale.any():
-            self._copy_worlds(self.arrays, self._ground_constants(), stale)
-            self.changed[stale] = False
-
     def set_task(self, task: Task) -> None:
         """Set a task for which the colony has the right arrays and kernels."""
         self.task, self.pheromones = task, task.pheromones_while(self.learns)
-        self.arrays["rewards"][:] = task.rewards.by_event()
-        self.arrays["choice"][:] = task.choice.numbers()
-        self.arrays["food_numbers"][:] = _food_numbers(task)
-        self.arrays |= self._caste_constants()
-        for name, numbers in _rule_numbers(task).items():
-            self.arrays[name][:] = numbers
+        self.arrays |= self._settings()
 
     def reseed(self, which: np.ndarray, seeds: Sequence[int]) -> None:
         """Set new seeds for some worlds, bool (W,), as if they had had no episodes."""
@@ -562,8 +526,8 @@ class ColonyState:
         changed = dict(zip(places.tolist(), seeds, strict=True))
         self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
         self.arrays["seeds"][:] = words_of(self.seeds)
-        self.at_start = self._start_of_episode()
-        self._copy_worlds(self.arrays, self._seeded(), which)
+        self._read_start(self.n_food_sources)
+        self._copy_worlds(self._seeded(), which)
 
     def stop(self, which: np.ndarray) -> None:
         """End the episode of some worlds, bool (W,), which then wait for their next episode."""
@@ -613,19 +577,36 @@ class ColonyState:
 
     def columns(self) -> tuple[str, ...]:
         """Return the names of the arrays with one entry for each slot."""
-        return (*(name for name in ALL_COLUMNS if name in self.arrays), "streams")
+        return (*(name for name in COLUMNS if name in self.arrays), "streams")
 
     # Arrays
 
-    def _start_of_episode(self) -> Arrays:
-        """Return compact arrays for the start of each episode; see `_set_to_start`."""
-        worlds, n = self.worlds, self.ants
+    def _read_start(self, n_food_sources: int) -> None:
+        """Set the arrays with which worlds and ants begin each episode, see `_set_to_start`."""
+        self.n_food_sources = n_food_sources
+        worlds, n, model = self.worlds, self.ants, self.model
         starts = [
             world.start(seed, n, self.start) for world, seed in zip(worlds, self.seeds, strict=True)
         ]
         cells = np.stack([cells for cells, _ in starts])
-        ground = self._of_each(World.ground)
         nests = self._of_each(lambda world: world.nests_of(n))
+        # Columns of the ants by world and number.
+        self.first = {
+            "cell": cells,
+            "heading": np.array([headings for _, headings in starts], np.int8),
+        }
+        if model.n_nests > 1:
+            self.first["nest"] = nests.astype(np.int8)
+        if model.n_castes:
+            self.first["caste"] = castes = np.zeros(cells.shape, np.int8)
+            for w, nest in np.ndindex(len(worlds), self.n_nests):
+                ours = nests[w] == nest
+                numbers = numbers_in(self.task.castes, nest, int(ours.sum()))
+                castes[w, ours] = np.repeat(np.arange(len(numbers)), numbers)
+        ground = self._of_each(World.ground)
+        loads = np.array([food.loads for food in self.task.foods.values()] or [1], np.int32)
+        kinds = self._of_each(World.kinds_by_cell)
+        loads = np.where(ground == FOOD, loads[kinds], 0).astype(np.int32)
         marks = (ANT_GROUND - (nests << 4)).astype(np.uint8)
         np.put_along_axis(ground, cells.astype(np.int64), marks, axis=1)
         levels = self._of_each(World.trail_levels)
@@ -638,28 +619,26 @@ class ColonyState:
         of_nests = np.zeros((len(NestRow), len(worlds) * self.n_nests), np.int32)
         queens = self._of_each(lambda world: world.grid.index(world.queens))
         of_nests[NestRow.QUEEN_CELL] = queens.reshape(-1)
-        by_caste = np.zeros(len(worlds) * len(self.task.castes), np.int32)
-        foods = [food_sources.at_start(world) for world in worlds] if self.n_food_sources else []
-        return {
-            # The start cells and headings of ants, by world and number.
-            "start_cells": cells,
-            "start_headings": np.array([headings for _, headings in starts], np.int8),
-            "start_castes": self._castes_at_start(nests).astype(np.int8),
-            "start_nests": nests[:, : n * (self.n_nests > 1)].astype(np.int8),
+        by_caste = {"caste_deliveries": np.zeros(len(worlds) * model.n_castes, np.int32)}
+        foods = [food_sources.at_start(world) for world in worlds] if n_food_sources else []
+        self.at_start = {
             # The ground of each cell, and the mark of the ant on it, see `layout`.
             "ground": ground.reshape(-1),
             # The clock at which a cell's trail has evaporated; if dense, its level.
-            array_of(0, self.model.dense_by_number[0]): levels.reshape(-1),
+            array_of(0, model.dense_by_number[0]): levels.reshape(-1),
             # The same for each further field, which is empty at the start.
             **self._further_fields(len(worlds)),
             "worlds": rows,
             "nests": of_nests,
-            **self._foods_at_start(ground),
-            **({"caste_deliveries": by_caste} if len(by_caste) else {}),
-            **({"stimulus": np.zeros(of_nests.shape[1])} if self.task.labour.divides else {}),
+            # The kind of the food in each cell, and its loads; tiny if kernels do not need them.
+            "kind_of": kinds.reshape(-1) if self.n_kinds > 1 else np.zeros(1, np.uint8),
+            "loads": loads.reshape(-1) if model.has_loads else np.zeros(1, np.int32),
+            "deliveries_by_nest_and_kind": np.zeros(of_nests.shape[1] * self.n_kinds, np.int32),
+            **(by_caste if model.n_castes else {}),
+            **({"stimulus": np.zeros(of_nests.shape[1])} if model.has_labour else {}),
             # Sums over all ants in this episode, see `Tally`.
             "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
-            **food_sources.arrays(foods, rows, self.n_food_sources, self.grid.size),
+            **food_sources.arrays(foods, rows, n_food_sources, self.grid.size),
         }
 
     def _further_fields(self, n: int) -> Arrays:
@@ -669,78 +648,16 @@ class ColonyState:
             for number, dense in enumerate(self.model.dense_by_number[1:], start=1)
         }
 
-    def _foods_at_start(self, ground: np.ndarray) -> Arrays:
-        """Return the kind of the food in each cell, its loads, and deliveries by nest and kind.
-
-        Arrays that a kernel does not need are tiny. `ground` is (W, grid.size).
-        """
-        kinds = self._of_each(World.kinds_by_cell)
-        loads = np.array([food.loads for food in self.task.foods.values()] or [1], np.int32)
-        here = np.where(ground == FOOD, loads[kinds], 0).astype(np.int32)
-        apart = len(self.worlds) * self.n_nests * self.n_kinds
-        return {
-            "kind_of": kinds.reshape(-1) if self.n_kinds > 1 else np.zeros(1, np.uint8),
-            "loads": here.reshape(-1) if self.task.has_loads else np.zeros(1, np.int32),
-            "deliveries_by_nest_and_kind": np.zeros(apart, np.int32),
-        }
-
-    def _castes_at_start(self, nests: np.ndarray) -> np.ndarray:
-        """Return the castes of ants by number (W, ants), from their nests; empty without castes."""
-        if not self.task.castes:
-            return nests[:, :0]
-        castes = np.zeros_like(nests)
-        for w, nest in np.ndindex(len(nests), self.n_nests):
-            ours = nests[w] == nest
-            numbers = numbers_in(self.task.castes, nest, int(ours.sum()))
-            castes[w, ours] = np.repeat(np.arange(len(numbers)), numbers)
-        return castes
-
-    def _of_episode(self) -> Arrays:
-        """Return the arrays that change in an episode, at its start."""
-        n_worlds, dense = len(self.worlds), self.model.dense_by_number[0]
-        slots, cells = n_worlds * self.capacity, n_worlds * self.grid.size
-        model = self.model
-        used = {
-            "executed": model.slips,
-            "state": not model.sees_paper_state,
-            "age": model.ants_change,
-            "next_action": model.draws_next_action,
-            "nest": model.n_nests > 1,
-            "kind": model.n_kinds > 1,
-            "caste": model.n_castes > 0,
-            "idle": model.has_labour,
-            "threshold": model.has_labour,
-            "reward": model.has_own_reward,
-        }
-        made = {
-            **{name: array.copy() for name, array in self._at_start().items()},
-            "trail": np.zeros(1 if dense else cells, np.int32),
-            "level": np.zeros(cells if dense else 1, np.float32),
-            **self._further_fields(cells),
-        }
-        for dtype, names in COLUMNS.items():
-            needed = [name for name in names if used.get(name, True)]
-            # One allocation, because columns at equal offsets in pages slow each other down.
-            made |= zip(needed, np.zeros((len(needed), slots), dtype), strict=True)
-        self._set_to_start(made)
-        return made
-
-    def _at_start(self) -> Arrays:
-        """Return the start of an episode without the cells and headings of ants."""
-        return {k: v for k, v in self.at_start.items() if not k.startswith("start_")}
-
-    def _set_to_start(self, arrays: Arrays, which: Which = ALL) -> None:
+    def _set_to_start(self, which: Which = ALL) -> None:
         """Reset the arrays that change in an episode, for these worlds."""
-        self._copy_worlds(arrays, self._at_start(), which)
-        shape = len(self.worlds), self.capacity
-        column = {name: arrays[name].reshape(shape) for name in ALL_COLUMNS if name in arrays}
-        for name, array in column.items():
-            array[which] = -1 if name in _UNKNOWN else 0
-        n = self.at_start["start_cells"].shape[1]
-        for name in column.keys() & {"cell", "heading", "nest", "caste"}:
-            column[name][which, :n] = self.at_start[f"start_{name}s"][which]
-        column["number"][which, :n] = np.arange(n)
-        column["stage"][which, :n] = Stage.LIVING
+        self._copy_worlds(self.at_start, which)
+        shape, n = (len(self.worlds), self.capacity), self.first["cell"].shape[1]
+        starts: Arrays = {**self.first, "number": np.arange(n), "stage": np.array(Stage.LIVING)}
+        for name in COLUMNS.keys() & self.arrays.keys():
+            slots = self.arrays[name].reshape(shape)
+            slots[which] = COLUMNS[name].start
+            if name in starts:
+                slots[which, :n] = np.broadcast_to(starts[name], (shape[0], n))[which]
 
     def _lasting(self, q_values: np.ndarray | None) -> Arrays:
         """Return the arrays that last through all episodes."""
@@ -777,28 +694,23 @@ class ColonyState:
     def _tables(self, q_values: np.ndarray | None) -> np.ndarray:
         """Return the tables of all worlds or slots, with `q_values` or the initial value."""
         n_worlds, slots, n_states = len(self.seeds), self.owners, self.task.n_states
-        own = self.one_a_slot or slots > 1
         q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
         q[..., :N_ACTIONS] = self.training.initial_q
         if q_values is not None:
-            leading, form = q_values.shape[:-2], f"{n_states}, {N_ACTIONS}"
-            axes = (n_worlds, *self._owner_axes)
-            if leading not in ((), (n_worlds,)) and not (own and leading == axes):
-                groups = self._group_axes
-                forms: list[tuple[str, tuple[int, ...]]] = [("world", ())]
-                forms += [(" and ".join(groups), tuple(groups.values()))] if groups else []
-                if self.sharing == "independent" or not (self.learns or self.task.castes):
-                    forms.append(("slot", (self.capacity,)))
-                several = [
-                    f"({', '.join(map(str, (n_worlds, *more)))}, {form}) for one table per {name}"
-                    for name, more in forms
+            leading, form, axes = q_values.shape[:-2], f"{n_states}, {N_ACTIONS}", self._axes
+            known = {(): 1, (n_worlds,): 1, (n_worlds, *axes.values()): slots}
+            if leading not in known:
+                forms = {"world": (n_worlds,), " and ".join(axes): (n_worlds, *axes.values())}
+                listed = [
+                    f"({', '.join(map(str, axis))}, {form}) for one table per {owner}"
+                    for owner, axis in forms.items()
+                    if owner
                 ]
                 raise AntsError(
-                    f"q_values has shape {q_values.shape}; give ({form}), {', or '.join(several)}."
+                    f"q_values has shape {q_values.shape}; give ({form}), {', or '.join(listed)}."
                 )
-            n_given = [] if not leading else [n_worlds, slots if leading == axes and own else 1]
-            given = q_values.reshape(*n_given, 1, n_states, N_ACTIONS)
-            q[..., :N_ACTIONS] = given
+            given = (n_worlds, known[leading]) if leading else ()
+            q[..., :N_ACTIONS] = q_values.reshape(*given, 1, n_states, N_ACTIONS)
         for number, (name, caste) in enumerate(self.task.castes.items()):
             if caste.policy is not None:
                 path = f"`task.castes.{name}.policy`"
@@ -818,11 +730,7 @@ class ColonyState:
             **self._ground_constants(),
             "compass": compass_of(self.grid),  # see `rules.actions`
             "seeds": words_of(self.seeds),
-            "rewards": self.task.rewards.by_event(),
-            "choice": self.task.choice.numbers(),
-            "food_numbers": _food_numbers(self.task),
-            **self._caste_constants(),
-            **_rule_numbers(self.task),
+            **self._settings(),
             "hyperparameters": np.array([*dict(self.training.hyperparameters).values(), 0.0]),
             # By n: the weight of the mean of n errors in an update; see `set_learning_rate`.
             "weights": np.zeros(2, np.float32),
@@ -846,32 +754,41 @@ class ColonyState:
             "touched": np.zeros(chunks * (pairs + 1), np.int32),
         }
 
-    def _caste_constants(self) -> Arrays:
-        """Return the numbers of castes and of labour; nothing without castes."""
-        task = self.task
-        arrays: Arrays = {}
+    def _settings(self) -> Arrays:
+        """Return the settings of the task as kernels read them."""
+        task, settings = self.task, {}
+        rules = [value for rule in task.rules.values() for value in vars(rule).values()]
         if task.labour.divides:
-            arrays["labour"] = np.array(task.labour.numbers)
-        if not task.castes:
-            return arrays
-        most = self.capacity if self.sharing == "shared" else 1
-        weights = [update_weights(one.learning_rate or 0.0, most) for one in task.castes.values()]
-        longest = max(map(len, weights))
-        nests = self.at_start["start_nests"] if self.n_nests > 1 else None
-        chances = []
-        for w, nest in np.ndindex(len(self.seeds), self.n_nests):
-            n = self.ants if nests is None else int(np.count_nonzero(nests[w] == nest))
-            chances.append(np.cumsum(chances_in(task.castes, nest, n)))
+            settings["labour"] = np.array(task.labour.numbers)
+        if task.castes:
+            most = self.capacity if self.sharing == "shared" else 1
+            rates = [caste.learning_rate or 0.0 for caste in task.castes.values()]
+            weights = [update_weights(rate, most) for rate in rates]
+            longest = max(map(len, weights))
+            chances = []
+            nests = self.first.get("nest", np.zeros((len(self.seeds), self.ants)))
+            for w, nest in np.ndindex(len(self.seeds), self.n_nests):
+                n = int(np.count_nonzero(nests[w] == nest))
+                chances.append(np.cumsum(chances_in(task.castes, nest, n)))
+            settings |= {
+                "castes": _caste_numbers(task, self.training.discount),
+                # By caste and n, see `update_weights`; unused without an own learning rate.
+                "caste_weights": np.stack(
+                    [np.pad(one, (0, longest - len(one)), mode="edge") for one in weights]
+                ),
+                # By world, nest and caste: cumulative probabilities of the castes of newborn ants.
+                "caste_chances": np.concatenate(chances),
+                "delivered_by_caste": np.zeros(
+                    len(self.seeds) * self.chunks * MAX_CASTES, np.int32
+                ),
+            }
+        if task.rules:  # the parameters of your own rules
+            settings["rule_numbers"] = np.array([*rules, 0.0], np.float64)
         return {
-            **arrays,
-            "castes": _caste_numbers(task, self.training.discount),
-            # By caste and n, see `update_weights`; unused without an own learning rate.
-            "caste_weights": np.stack(
-                [np.pad(one, (0, longest - len(one)), mode="edge") for one in weights]
-            ),
-            # By world, nest and caste: cumulative probabilities of the castes of newborn ants.
-            "caste_chances": np.concatenate(chances),
-            "delivered_by_caste": np.zeros(len(self.seeds) * self.chunks * MAX_CASTES, np.int32),
+            "rewards": task.rewards.by_event(),
+            "choice": task.choice.numbers(),
+            "food_numbers": _food_numbers(task),
+            **settings,
         }
 
     def _ground_constants(self) -> Arrays:
@@ -880,7 +797,9 @@ class ColonyState:
             # 1 for rocks and outside.
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
             # By cell: a bit for each heading that leads nearer to the queen.
-            "closer": self._of_each(_closer_to_each).reshape(-1),
+            "closer": self._of_each(
+                lambda world: np.stack([world.closer(nest) for nest in range(world.n_nests)])
+            ).reshape(-1),
         }
 
     def _of_each(self, make: Callable[[World], np.ndarray]) -> np.ndarray:
@@ -888,13 +807,14 @@ class ColonyState:
         made = {world: make(world) for world in dict.fromkeys(self.worlds)}
         return np.stack([made[world] for world in self.worlds])
 
-    def _copy_worlds(self, into: Arrays, source: Arrays, which: Which) -> None:
-        """Copy the parts of some worlds; worlds are consecutive in the last axis."""
+    def _copy_worlds(self, source: Arrays, which: Which) -> None:
+        """Copy some worlds from other arrays; worlds are consecutive in the last axis."""
         n_worlds = len(self.seeds)
         for name, array in source.items():
             if array.shape[-1] % n_worlds == 0:  # others are not in use
                 shape = (*array.shape[:-1], n_worlds, -1)
-                into[name].reshape(shape)[..., which, :] = array.reshape(shape)[..., which, :]
+                kept = self.arrays[name].reshape(shape)
+                kept[..., which, :] = array.reshape(shape)[..., which, :]
 
     # Files
 
@@ -940,11 +860,10 @@ class ColonyState:
         """
         runtime.start(threads, arch)  # first, because its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):
-            given = facts["training"]
-            training = None if given is None else TrainingConfig(**given)
+            training = facts["training"] and TrainingConfig(**facts["training"])
             if training is not None:
                 learners.get(training.learner)
-            worlds = [World.from_dict(one) for one in facts["worlds"]]
+            worlds = [World.from_dict(world) for world in facts["worlds"]]
             task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
             if options["sharing"] == "frozen" and training is not None:
                 # Tables of the right shape, which the arrays of the file replace.
@@ -953,19 +872,14 @@ class ColonyState:
             # Policies of castes are in the arrays of the file; theirs may no longer exist.
             known = task.with_policies("random")
             colony = cls([worlds[w] for w in facts["world_of"]], known, training, **options)
-            colony.task = task
+            colony.task, colony.length, colony.ticks = task, facts["length"], facts["ticks"]
             colony.epsilon = arguments.checked_share("epsilon", facts["epsilon"])
-            colony.set_learning_rate(
-                arguments.checked_share("learning_rate", facts["learning_rate"])
-            )
-            colony.length = checked_whole("length", facts["length"], least=0)
-            colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
+            colony.set_learning_rate(facts["learning_rate"])
             if facts["food_sources"] != colony.n_food_sources:
                 colony.make_room_for_food(facts["food_sources"])
             for name in colony.stored:
-                array, kept = colony.arrays[name], arrays[f"array_{name}"]
-                as_array(name, kept, array.dtype, array.shape)
-                array[:] = kept
+                array = colony.arrays[name]
+                array[:] = as_array(name, arrays[f"array_{name}"], array.dtype, array.shape)
             colony.ready = colony.arrays["episodes"] >= 0
         return colony
 
@@ -983,11 +897,6 @@ class ColonyState:
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
 
 
-def _closer_to_each(world: World) -> np.ndarray:
-    """Return `World.closer` of all nests, uint8 (nests, grid.size)."""
-    return np.stack([world.closer(nest) for nest in range(world.n_nests)])
-
-
 def _food_numbers(task: Task) -> np.ndarray:
     """Return the settings of the kinds of food, int32 (FoodRow, kinds)."""
     kinds = task.foods.values()
@@ -998,35 +907,29 @@ def _food_numbers(task: Task) -> np.ndarray:
     return numbers
 
 
-def _rule_numbers(task: Task) -> Arrays:
-    """Return the parameters of your own rules, float64 (parameters,); nothing without rules."""
-    numbers = [value for one in task.rules.values() for value in vars(one).values()]
-    return {"rule_numbers": np.array([*numbers, 0.0], np.float64)} if task.rules else {}
-
-
 def _caste_numbers(task: Task, discount: float) -> np.ndarray:
     """Return the numbers of the castes, float64 (CasteRow, castes)."""
-    choice, life, labour = task.choice, task.life, task.labour
     pheromones, cues = (TRAIL, *task.fields), task.all_cues
     numbers = np.zeros((len(CasteRow), len(task.castes)))
-    for k, one in enumerate(task.castes.values()):
-        lifespan = life.lifespan if one.lifespan is None else one.lifespan
-        usual = choice.numbers()
-        own = (one.temperature, one.k, one.exponent)
+    for k, caste in enumerate(task.castes.values()):
         numbers[:, k] = (
-            -1.0 if one.epsilon is None else one.epsilon,
-            one.epsilon_spread or 0.0,
-            -1.0 if one.learning_rate is None else one.learning_rate,
-            discount if one.discount is None else one.discount,
-            *(usual[i] if own[i] is None else own[i] for i in range(3)),
-            one.policy is None,
-            sum(1 << pheromones.index(name) for name in set(one.pheromones_laid(pheromones))),
-            cues.index(task.cues_of(one)),
-            -1 if lifespan is None else lifespan,
-            (labour.stop_probability or 0.0) * one.threshold.exists,
-            *one.threshold.numbers,
+            _or(caste.epsilon, -1.0),
+            _or(caste.epsilon_spread, 0.0),
+            _or(caste.learning_rate, -1.0),
+            _or(caste.discount, discount),
+            *map(_or, (caste.temperature, caste.k, caste.exponent), task.choice.numbers()),
+            caste.policy is None,
+            sum(1 << pheromones.index(name) for name in set(caste.pheromones_laid(pheromones))),
+            cues.index(task.cues_of(caste)),
+            _or(caste.lifespan, _or(task.life.lifespan, -1)),
+            _or(task.labour.stop_probability, 0.0) * caste.threshold.exists,
+            *caste.threshold.numbers,
         )
     return numbers
+
+
+def _or(number: float | None, default: float) -> float:
+    return default if number is None else number
 
 
 def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -> tuple[World, ...]:

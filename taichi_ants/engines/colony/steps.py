@@ -20,14 +20,7 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.engines.colony import labour
-from taichi_ants.engines.colony.columns import (
-    group_of,
-    individual,
-    nest_of,
-    of_caste,
-    put,
-    trait,
-)
+from taichi_ants.engines.colony.columns import group_of, individual, nest_of, of_caste, put, trait
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,

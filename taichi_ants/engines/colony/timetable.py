@@ -9,7 +9,7 @@ import numpy as np
 
 from taichi_ants import measures
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.engines.colony.stepping import Stepper
+from taichi_ants.engines.colony.stepping import Stepper, TickingColony
 from taichi_ants.errors import AntsError
 from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
 
@@ -24,7 +24,7 @@ class Timetable:
         AntsError: An event cannot happen in an episode of `length` ticks, or in this colony.
     """
 
-    def __init__(self, colony: Any, protocol: Any, length: int) -> None:
+    def __init__(self, colony: TickingColony, protocol: Any, length: int) -> None:
         self._colony, self._events, self._length = colony, checked_protocol(protocol), length
         self._at: dict[int, list[tuple[int, ProtocolEvent]]] = {}  # by tick: indices and events
         for number, event in enumerate(self._events):

@@ -6,65 +6,25 @@ last or its present cell, or on the cell of the food that it takes, so that no t
 one cell of a field in a tick.
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections import namedtuple
 
 import taichi as ti
 
-from taichi_ants.engines.colony.layout import array_of
 from taichi_ants.task.constants import EMPTY, OBSTACLE, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import Occasion
+from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rules import pheromone, vision
 
-_NUMBERS = (
-    *("deposits", "deposit_level", "cap", "slope", "fades_after"),
-    *("evaporates", "decay", "share"),
+# A pheromone in kernels: whether it is dense; its view; its arrays, of which `spare` has the next
+# levels, with diffusion; `Pheromone.numbers`; the occasions of deposits, None for the trail; and
+# your rules, or None.
+NUMBERS = tuple(Pheromone().numbers)
+PheromoneArrays = namedtuple(
+    "PheromoneArrays",
+    ("dense", "half", "under_carriers", "levels", "spare", *NUMBERS)
+    + ("deposited_when", "own_deposit", "own_evaporation"),
 )
-
-
-class PheromoneArrays(NamedTuple):
-    """A pheromone in kernels: whether it is dense, its view, its arrays, `Pheromone.numbers`."""
-
-    dense: bool
-    half: bool
-    under_carriers: bool
-    levels: Any
-    spare: Any  # the next levels, with diffusion
-    deposits: Any
-    deposit_level: Any
-    cap: Any
-    slope: Any
-    fades_after: Any
-    evaporates: Any
-    decay: Any
-    share: Any
-    deposited_when: Any  # the occasions of deposits; None for the trail
-    own_deposit: Any  # your rules, or None
-    own_evaporation: Any
-
-
-def pheromone_of(
-    c: Any,
-    number: int,
-    dense: bool,
-    view: str,
-    own_deposit: Callable[..., Any] | None,
-    own_evaporation: Callable[..., Any] | None,
-) -> PheromoneArrays:
-    """Return a pheromone with the arrays and numbers of an argument pack."""
-    end = f"_{number}" if number else ""
-    return PheromoneArrays(
-        dense,
-        view == "half",
-        view == "strongest_under_carriers",
-        getattr(c, array_of(number, dense)),
-        getattr(c, f"spare{end}") if dense else None,
-        *(getattr(c, name + end) for name in _NUMBERS),
-        deposited_when=getattr(c, f"deposited_when{end}") if number else None,
-        own_deposit=own_deposit,
-        own_evaporation=own_evaporation,
-    )
 
 
 @ti.func

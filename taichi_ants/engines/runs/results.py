@@ -15,6 +15,7 @@ from taichi_ants.engines.runs.engine import RunState
 from taichi_ants.errors import as_array, expect
 from taichi_ants.files import PathLike
 from taichi_ants.files.archives import Kind
+from taichi_ants.files.tables import column
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.finished import counts_of_lone_ant, of_lone_ants
 from taichi_ants.measures.tidy import Measured, Tidy

@@ -10,7 +10,7 @@ from random_castes import drawn_castes
 from random_choices import NOISE
 from random_colonies import RandomColony, random_colony, with_nests
 from random_rewards import random_rewards
-from same_colonies import assert_equal, equal_ticks
+from same_colonies import assert_equal, every_tick
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, learners, worlds
 from taichi_ants.reference import ReferenceColony
@@ -59,6 +59,11 @@ def both(drawn: RandomColony) -> tuple[Colony, ReferenceColony]:
     return Colony(*drawn.model, **drawn.options), ReferenceColony(*drawn.model, **drawn.options)
 
 
+def happened(plain: ReferenceColony, *counts: str) -> list[int]:
+    """In how many episodes each of these counts is not 0."""
+    return [sum(getattr(record, name) > 0 for record in plain.records) for name in counts]
+
+
 def without_rocks(world: World) -> World:
     """Nor half of the food, nor trails."""
     return World(world.ranges, world.queen, foods=world.foods[::2], ants=world.ants)
@@ -66,22 +71,22 @@ def without_rocks(world: World) -> World:
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
 QUICK, LONG = (0, 1, 10, 13), (2, 3, 6, 7, 8, 14)
-SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
 
 
-def marked(kernels, quick, long):
+def marked(kernels: list, quick: tuple[int, ...], long: tuple[int, ...]) -> list:
     """Kernels with marks; golden hashes show that the results of the longest stay."""
     later = [pytest.mark.long if k in long else pytest.mark.slow for k in range(len(kernels))]
     marks = [() if k in quick else mark for k, mark in enumerate(later)]
-    return [pytest.param(one, marks=mark) for one, mark in zip(kernels, marks, strict=True)]
+    return [pytest.param(kernel, marks=mark) for kernel, mark in zip(kernels, marks, strict=True)]
 
 
 @pytest.mark.parametrize("kernel", marked(KERNELS, QUICK, LONG), ids=str)
 def test_every_tick_in_crowded_micro_worlds(kernel):
     """Two episodes each: something goes on between them, in every other case in another world."""
     learner, sharing, observation, dense, *rules = kernel
-    happened = np.zeros(5, dtype=int)
-    later, is_large = kernel in SLOW, observations.get(observation).n_states >= 1000
+    seen = np.zeros(5, dtype=int)
+    later = KERNELS.index(kernel) not in QUICK
+    is_large = observations.get(observation).n_states >= 1000
     for seed in range(8 if is_large else 12 if later else 20):
         drawn = random_colony(
             seed,
@@ -95,21 +100,15 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
             changes=kernel is not KERNELS[0],
         )
         colony, plain = both(drawn)
-        for ticks, world in ((11, None), (8, without_rocks(drawn.world) if seed % 2 else None)):
-            for _ in equal_ticks(colony, plain, ticks, world):
-                pass
-            record = plain.records[-1]
-            happened += [
-                record.births > 0,
-                record.deaths > 0,
-                record.regrown > 0,
-                record.deliveries > 0,
-                record.blocked > 0,
-            ]
+        for _ in every_tick(
+            colony, plain, (11, None), (8, without_rocks(drawn.world) if seed % 2 else None)
+        ):
+            pass
+        seen += happened(plain, "births", "deaths", "regrown", "deliveries", "blocked")
     rarely = "noise" in str(rules)  # ants that slip or misread deliver rarely
     births = not (rarely or later or observation == "queues")
     deliveries = 2 - rarely - later
-    assert (happened >= [births, 3, 3, deliveries, 6 if later else 12]).all(), happened
+    assert (seen >= [births, 3, 3, deliveries, 6 if later else 12]).all(), seen
 
 
 # Learner, sharing, observation, dense, traffic, view; nests, kinds of food, several loads.
@@ -136,7 +135,7 @@ def with_strangers(view):
 def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers):
     """Deliveries by nest and kind, loads, regrowth, births by nest: two episodes each."""
     learner, sharing, observation, dense, traffic, view, nests, kinds, loads = kernel
-    happened = np.zeros(5, dtype=int)
+    seen = np.zeros(5, dtype=int)
     for seed in range(24):
         drawn = random_colony(
             seed,
@@ -156,18 +155,11 @@ def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers)
         if drawn.world.n_nests != nests:
             continue  # kernels are compiled for a number of nests
         colony, plain = both(drawn)
-        for ticks in (13, 9):
-            for _ in equal_ticks(colony, plain, ticks):
-                pass
-            record, nests_of = plain.records[-1], [nest for nest, _ in plain.records[-1].delivered]
-            happened += [
-                record.births > 0,
-                record.deaths > 0,
-                record.regrown > 0,
-                record.deliveries > 0,
-                max(nests_of, default=0) > 0,
-            ]
-    assert (happened >= [1, 3, 3, 2, 1]).all(), happened
+        for _ in every_tick(colony, plain, (13, None), (9, None)):
+            pass
+        seen[:4] += happened(plain, "births", "deaths", "regrown", "deliveries")
+        seen[4] += any(nest > 0 for record in plain.records for nest, _ in record.delivered)
+    assert (seen >= [1, 3, 3, 2, 1]).all(), seen
 
 
 # Learner, sharing, observation, dense, traffic, view; castes, labour, nests; more rules.
@@ -187,7 +179,7 @@ CASTES = [
 def test_every_tick_with_castes_and_division_of_labour(kernel):
     """Numbers, tables, cues and deposits of castes, births, thresholds and idle ants."""
     learner, sharing, observation, dense, traffic, view, castes, labour, nests, more = kernel
-    happened, cues = np.zeros(6, dtype=int), more.get("cues_of")
+    seen, cues = np.zeros(6, dtype=int), more.get("cues_of")
     rules = {name: one for name, one in more.items() if name != "cues_of"}
     for seed in range(18):
         drawn = random_colony(
@@ -207,17 +199,15 @@ def test_every_tick_with_castes_and_division_of_labour(kernel):
         if drawn is None or drawn.world.n_nests != nests:
             continue
         colony, plain = both(drawn)
-        for ticks in (13, 9):
-            idle = None
-            for _ in equal_ticks(colony, plain, ticks):
-                now = colony.idle & colony.living
-                if idle is not None:
-                    happened[4:] += [(idle & ~now).any(), (now & ~idle).any()]
-                idle = now
-            record = plain.records[-1]
-            several = len({ant.caste for ant in plain.ants.values()}) == castes
-            happened[:4] += [record.births > 0, record.deaths > 0, record.deliveries > 0, several]
-    assert (happened >= [1, 3, 2, 1, 20 * labour, 5 * labour]).all(), happened
+        idle = np.zeros(1, bool)
+        for _ in every_tick(colony, plain, (13, None), (9, None)):
+            now = colony.idle & colony.living
+            begins = colony.ticks == 1  # all are new
+            seen[4:] += [(idle & ~now).any() and not begins, (now & ~idle).any() and not begins]
+            idle = now
+        seen[:3] += happened(plain, "births", "deaths", "deliveries")
+        seen[3] += len({ant.caste for ant in plain.ants.values()}) == castes
+    assert (seen >= [1, 3, 2, 1, 20 * labour, 5 * labour]).all(), seen
 
 
 def with_levels(view):
@@ -256,7 +246,7 @@ def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
         drawn = random_colony(seed, fields="aB", changes=True, **rules)
         drawn = replace(drawn, task=replace(drawn.task, observation="levels"), q_values=None)
         colony, plain = both(drawn)
-        for _ in equal_ticks(colony, plain, 20):
+        for _ in every_tick(colony, plain, (20, None)):
             for ant in plain.ants.values():
                 misread, ant.misread = ant.misread, {}
                 hidden += levels_seen(plain.world, ant) != ant.state
