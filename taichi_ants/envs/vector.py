@@ -72,7 +72,7 @@ class Ants(ABC):
         worlds: Worlds with the same ranges; world number w is worlds[w % len(worlds)].
         max_steps: The step limit of an episode.
         shown: The format of observations.
-        mode: How vector environments begin the next episode.
+        mode: The autoreset mode of vector environments.
     """
 
     mode = AutoresetMode.DISABLED
