@@ -179,16 +179,10 @@ def world_of(world_kind: str) -> World | Drawn:
 
 @dataclass(frozen=True)
 class Plan:
-    """The study of some conditions, of kinds of world and numbers of ants."""
+    """The study, and the point of each condition."""
 
     study: Study
     conditions: Conditions
-    world_kinds: tuple[str, ...]
-    sizes: tuple[int, ...]
-
-    def facts(self) -> dict[str, Any]:
-        """Return facts for the manifest of the results."""
-        return {"world_kinds": self.world_kinds, "sizes": self.sizes}
 
 
 def plan(options: Mapping[str, Any]) -> Plan:
@@ -212,7 +206,7 @@ def plan(options: Mapping[str, Any]) -> Plan:
     conditions = conditions_of(*several, training, **{name: options[name] for name in names})
     seeds = tuple(range(options["seed"], options["seed"] + options["seeds"]))
     points = *conditions.values(), *map(greedy, conditions.values())
-    return Plan(Study(points, seeds, tuple(COLONY), measured), conditions, *several)
+    return Plan(Study(points, seeds, tuple(COLONY), measured), conditions)
 
 
 def conditions_of(

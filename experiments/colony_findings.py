@@ -26,7 +26,7 @@ from taichi_ants.analysis.findings import (
     weakest,
 )
 from taichi_ants.analysis.statistics import Estimator
-from taichi_ants.analysis.sweeps import centre_columns, centres_of, seed_rows
+from taichi_ants.analysis.sweeps import centre_columns, centres_of
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,
@@ -193,7 +193,11 @@ class ConditionRow(NamedTuple):
 
 def rows_of_seeds(measured: Measured, seeds: Sequence[int]) -> list[dict[str, Any]]:
     """Return the rows of seeds.csv: all measures of each seed under each condition."""
-    return list(seed_rows([one._asdict() for one in measured], seeds, _stacked(measured)))
+    return [
+        {**condition._asdict(), "seed": seed, **{name: float(one[name][s]) for name in OF_STUDY}}
+        for condition, one in measured.items()
+        for s, seed in enumerate(seeds)
+    ]
 
 
 def _stacked(measured: Measured) -> dict[str, np.ndarray]:

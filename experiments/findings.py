@@ -139,7 +139,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def make_findings(settings: argparse.Namespace) -> None:
     """Draw all three pictures and print their numbers."""
     results = ROOT / "results" / "compare"
-    compare.start(["--out", str(results)])
+    compare.main(["--out", str(results)])
     behaviours, shares, by_rules = policies(results), winners(results), deliveries()
     counts = {one: int((behaviours == one).sum()) for one in (DELIVERS, WALKS, CIRCLES)}
     print(f"deliver, walk, circle: {counts}")

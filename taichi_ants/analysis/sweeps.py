@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,15 +24,6 @@ _TERMINAL = 200  # the maximum number of columns
 _WIDE = 20  # the ratio of largest to smallest from which an axis is logarithmic
 _COLUMNS = 4  # panels of a design in a row
 _PARTS = 8  # of a range, each with a mean
-
-
-def seed_rows(
-    settings: Sequence[Settings], seeds: Sequence[int], values: Mapping[str, np.ndarray]
-) -> Iterator[dict[str, Any]]:
-    """Yield a row for each point and seed: settings, seed and measures, from float64 (P, S)."""
-    for p, row in enumerate(settings):
-        for s, seed in enumerate(seeds):
-            yield {**row, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
 def centre_columns(

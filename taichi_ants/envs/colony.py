@@ -19,6 +19,7 @@ from taichi_ants.envs.vector import (
     AntVectorEnv,
     Arguments,
     Rules,
+    Step,
     Worlds,
     task_of,
 )
@@ -101,9 +102,7 @@ class ColonyWorlds(Ants):
     def over(self) -> np.ndarray:
         return self.colony.episode_ticks >= self.max_steps
 
-    def advance(
-        self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def advance(self, actions: np.ndarray, waiting: np.ndarray) -> Step:
         if self.task.delivery == "terminates":  # the next episode of these ants has begun
             delivered = self.colony.events == Event.DELIVERED
             self.deliveries = np.where(delivered, 0, self.deliveries)
@@ -112,34 +111,29 @@ class ColonyWorlds(Ants):
         terminated = self.events == Event.DELIVERED
         if self.task.delivery != "terminates":
             terminated = np.zeros_like(terminated)
-        if mode is AutoresetMode.SAME_STEP and (over.any() or terminated.any()):
+        if self.mode is AutoresetMode.SAME_STEP and (over.any() or terminated.any()):
             self._last = self.facts()
         self._results = self.events.astype(np.uint8).reshape(-1), self.states().copy()
         begins = over
-        if mode is not AutoresetMode.SAME_STEP:
-            begins = waiting & (mode is AutoresetMode.NEXT_STEP)
+        if self.mode is not AutoresetMode.SAME_STEP:
+            begins = waiting & (self.mode is AutoresetMode.NEXT_STEP)
         if begins.any():
             self.begin(begins, [None] * len(begins))
         truncated = np.repeat(over, self.colony.capacity)
         return self.rewards.reshape(-1), terminated.reshape(-1), truncated
 
     def play(
-        self,
-        into: Rollout,
-        finals: np.ndarray,
-        mode: AutoresetMode,
-        waiting: np.ndarray,
-        choices: TablePolicy | None,
+        self, into: Rollout, finals: np.ndarray, waiting: np.ndarray, choices: TablePolicy | None
     ) -> None:
         masks = choices.masks() if choices is not None else None
         for t, actions in enumerate(into.actions):
             if choices is not None and masks is not None:
                 actions[:] = choices.draw(masks.take(self.states()))
-            rewards, terminated, truncated = self.advance(actions, mode, waiting)
+            rewards, terminated, truncated = self.advance(actions, waiting)
             into.rewards[t], into.terminated[t], into.truncated[t] = rewards, terminated, truncated
             into.events[t], finals[t] = self._results
             ended = truncated.reshape(self.acted.shape)[:, 0]
-            waiting = ended | (waiting & (mode is AutoresetMode.DISABLED))
+            waiting = ended | (waiting & (self.mode is AutoresetMode.DISABLED))
             into.observations[t + 1] = self.shown.show(self.states())
 
     def states(self) -> np.ndarray:

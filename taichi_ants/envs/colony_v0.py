@@ -22,6 +22,8 @@ try:
 except ImportError as error:
     raise ImportError(missing("colony_v0", "pettingzoo", "pettingzoo")) from error
 
+Infos = dict[str, dict[str, Any]]  # by agent and name
+
 
 class HexColonyParallelEnv(ParallelEnv):
     """The ants of one world, as agents of a `pettingzoo.ParallelEnv`.
@@ -94,7 +96,7 @@ class HexColonyParallelEnv(ParallelEnv):
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    ) -> tuple[dict[str, Any], Infos]:
         """Begin an episode.
 
         Args:
@@ -120,13 +122,7 @@ class HexColonyParallelEnv(ParallelEnv):
 
     def step(
         self, actions: dict[str, int]
-    ) -> tuple[
-        dict[str, Any],
-        dict[str, float],
-        dict[str, bool],
-        dict[str, bool],
-        dict[str, dict[str, Any]],
-    ]:
+    ) -> tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
         """Take the actions of all agents.
 
         Args:
@@ -171,9 +167,7 @@ class HexColonyParallelEnv(ParallelEnv):
         numbers = self._worlds.colony.numbers[0, slots]
         return [f"ant_{number}" for number in numbers.tolist()]
 
-    def _told(
-        self, names: list[str], slots: list[int]
-    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    def _told(self, names: list[str], slots: list[int]) -> tuple[dict[str, Any], Infos]:
         facts = {key: values[slots] for key, values in self._worlds.facts().items()}
         observations = dict(zip(names, self._worlds.shown.show(facts["state"]), strict=True))
         infos = {

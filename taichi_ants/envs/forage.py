@@ -24,6 +24,7 @@ from taichi_ants.envs.vector import (
     OfAnts,
     Place,
     Rules,
+    Step,
     Worlds,
     task_of,
 )
@@ -80,22 +81,15 @@ class LoneAnts(Ants):
             self.batched.seed(list(seed_of.values()), np.array(list(seed_of)))
         self.batched.begin(which)
 
-    def advance(
-        self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        begins = waiting if mode is AutoresetMode.NEXT_STEP else 0
-        self.batched.step(actions, begins, same_step=mode is AutoresetMode.SAME_STEP)
+    def advance(self, actions: np.ndarray, waiting: np.ndarray) -> Step:
+        begins = waiting if self.mode is AutoresetMode.NEXT_STEP else 0
+        self.batched.step(actions, begins, same_step=self.mode is AutoresetMode.SAME_STEP)
         arrays = self.batched.arrays
         results = arrays["results"]
         return arrays["rewards_of"].copy(), results & TERMINATED != 0, results & TRUNCATED != 0
 
     def play(
-        self,
-        into: Rollout,
-        finals: np.ndarray,
-        mode: AutoresetMode,
-        waiting: np.ndarray,
-        choices: TablePolicy | None,
+        self, into: Rollout, finals: np.ndarray, waiting: np.ndarray, choices: TablePolicy | None
     ) -> None:
         policy = choices and (choices.masks(), choices.streams, choices.epsilon)
         rows = {
@@ -105,7 +99,7 @@ class LoneAnts(Ants):
             "result_rows": into.events,
             "final_states": finals,
         }
-        self.batched.rollout(rows, self.shown.table, waiting, _AFTER_END[mode], policy)
+        self.batched.rollout(rows, self.shown.table, waiting, _AFTER_END[self.mode], policy)
         np.not_equal(into.events & TERMINATED, 0, out=into.terminated)
         np.not_equal(into.events & TRUNCATED, 0, out=into.truncated)
         np.bitwise_and(into.events, TRUNCATED - 1, out=into.events)

@@ -37,6 +37,7 @@ from taichi_ants.worlds import World, build, from_text
 Place = str | os.PathLike[str] | World
 Worlds = Place | Sequence[Place]
 Rules = Task | str
+Step = tuple[np.ndarray, np.ndarray, np.ndarray]  # rewards, terminations, truncations
 
 
 def _action_masks() -> np.ndarray:
@@ -71,7 +72,10 @@ class Ants(ABC):
         worlds: Worlds with the same ranges; world number w is worlds[w % len(worlds)].
         max_steps: The step limit of an episode.
         shown: The format of observations.
+        mode: The autoreset mode of vector environments.
     """
+
+    mode = AutoresetMode.DISABLED
 
     def __init__(
         self,
@@ -100,29 +104,22 @@ class Ants(ABC):
         """
 
     @abstractmethod
-    def advance(
-        self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return rewards, float64 (n,), terminations and truncations, bool (n,), as copies.
+    def advance(self, actions: np.ndarray, waiting: np.ndarray) -> Step:
+        """Take a step; return float64 (n,) and bool (n,), as copies.
 
         `actions` are those of all ants, (n,); `waiting`, bool (W,), marks worlds that had ended.
         """
 
     @abstractmethod
     def play(
-        self,
-        into: Rollout,
-        finals: np.ndarray,
-        mode: AutoresetMode,
-        waiting: np.ndarray,
-        choices: TablePolicy | None,
+        self, into: Rollout, finals: np.ndarray, waiting: np.ndarray, choices: TablePolicy | None
     ) -> None:
         """Take the steps of a rollout, and write its arrays.
 
         Args:
             into: Has the actions, unless there are `choices`. Its first observations stay as they
                 are, as do its final ones.
-            finals: int32 (steps, n): where an episode ends and `mode` is SAME_STEP, its last state.
+            finals: int32 (steps, n): where an episode ends in mode SAME_STEP, its last state.
             waiting: As in `advance`. Worlds that end in mode DISABLED wait in all further steps.
             choices: The policy of all ants, or None.
         """
@@ -211,7 +208,8 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         self._ants, self._n_worlds, self.num_envs = ants, n_worlds, num_envs
         mode = getattr(autoreset_mode, "value", autoreset_mode)
         check_one_of("autoreset_mode", mode, [allowed.value for allowed in AutoresetMode])
-        self.autoreset_mode, self.render_mode = AutoresetMode(mode), render_mode
+        self.autoreset_mode = ants.mode = AutoresetMode(mode)
+        self.render_mode = render_mode
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.single_observation_space = ants.shown.space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -276,12 +274,12 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
             ResetNeeded: No episode has begun, or autoreset_mode is "Disabled" and one has ended.
             InvalidAction: The number of actions is wrong, or an action does not exist.
         """
-        waiting, ants, mode = self._waiting("step"), self._ants, self.autoreset_mode
+        waiting, ants = self._waiting("step"), self._ants
         chosen = checked_actions(actions, (self.num_envs,))
-        rewards, terminated, truncated = ants.advance(chosen, mode, waiting)
-        over, final = terminated | truncated, {}
+        rewards, terminated, truncated = ants.advance(chosen, waiting)
+        over, final = terminated | truncated, dict[str, Any]()
         facts = ants.facts()
-        if mode is AutoresetMode.SAME_STEP and over.any():
+        if ants.mode is AutoresetMode.SAME_STEP and over.any():
             last = ants.facts(last=True)
             seen = np.full(self.num_envs, None, dtype=object)
             seen[over] = np.fromiter(ants.shown.show(last["state"][over]), dtype=object)
@@ -358,7 +356,7 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
             choices = TablePolicy(q_values, streams, epsilon)
         finals = np.empty((length, n), np.int32)
         into.observations[0] = ants.shown.show(ants.states())
-        ants.play(into, finals, self.autoreset_mode, waiting, choices)
+        ants.play(into, finals, waiting, choices)
         over = into.terminated | into.truncated
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             return into._replace(final_observations=ants.shown.show(finals[over]))

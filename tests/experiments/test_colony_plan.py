@@ -63,7 +63,7 @@ def test_every_condition_is_evaluated_without_exploration_too() -> None:
     for point in asked.conditions.values():
         calm = greedy(point)
         assert {point, calm} <= {*asked.study.points}
-        assert (calm.exploration, calm.episodes) == (0, 0)
+        assert (calm.evaluation_epsilon, calm.episodes) == (0, 0)
         assert calm.after == (point.after or point)
         assert (calm.world, calm.task, calm.ants) == (point.world, point.task, point.ants)
     assert asked.study.seeds == SEEDS
