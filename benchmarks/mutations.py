@@ -88,7 +88,7 @@ MUTATIONS = [
     ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
     ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
     ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
-    ("engines/colony/kernels.py", "features.carriers_follow if", "outbound if", CHOICE),
+    ("task/model.py", "followed = carriers_follow if", "followed = outbound if", CHOICE),
     ("measures/tidy.py", "column.startswith(f", "column == (f", RESULTS_OF_RUNS),
     ("rendering/rasteriser.py", "ANTS[snapshot.ant_nests]", "ANTS[0 * snapshot.ant_nests]", RASTER),
     (
@@ -182,14 +182,14 @@ MUTATIONS = [
     ("task/rules/vision.py", "2 * level >= ti.max", "2 * level > ti.max", COLONY),
     ("task/rules/vision.py", "ti.max(strongest, 1)", "ti.max(strongest, 0)", RUNS),
     ("task/rules/vision.py", "nearer >> 1 & 1", "nearer >> 2 & 1", RUNS),
-    ("task/observations/queues.py", "code = 6", "code = 5", COLONY),
+    ("task/observations/built_in.py", "code = 6", "code = 5", COLONY),
     (
-        "task/observations/trail_levels.py",
+        "task/observations/built_in.py",
         "level < view.strongest -",
         "level <= view.strongest -",
         "tests/engines/test_views.py",
     ),
-    ("task/observations/ants_seen.py", "view.ants[k] != 0", "view.ants[k] == 1", COLONY),
+    ("task/observations/built_in.py", "5 * index + code", "5 * index + view.codes[k]", COLONY),
     ("task/rewards.py", "[[Event.ENTERED_EMPTY, Event.PUSHED]]", "[Event.ENTERED_EMPTY]", TRAFFIC),
     # Engines.
     ("engines/runs/kernels.py", "step + 1 == a.max_steps", "step == a.max_steps", RUNS),
@@ -281,7 +281,6 @@ MUTATIONS = [
     ("files/archives.py", "if size > most:", "if size > 2 * most:", ARCHIVES),
     ("files/archives.py", "if version != self.version:", "if version < 0:", ARCHIVES),
     ("files/__init__.py", 'with open(temporary, "wb")', 'with open(target, "wb")', FILES),
-    ("files/__init__.py", "st_mtime > _ABANDONED", "st_mtime >= 0", FILES),
     ("files/__init__.py", "None if v != v else v", "v", FILES),
     (
         "studies/store.py",
@@ -310,10 +309,10 @@ MUTATIONS = [
     ("studies/sweep.py", "array[at, of].astype(float)", "array[at, 0].astype(float)", GROWING),
     # Recorder and viewer.
     ("viewer/recorder.py", "executed + 16 *", "executed + 8 *", RECORDING),
-    ("viewer/recorder.py", "headings + 8 * carrying", "headings + 8 * ~carrying", RECORDING),
+    ("viewer/recorder.py", "[order] + 8 * carrying", "[order] + 8 * ~carrying", RECORDING),
     ("viewer/recorder.py", "*rates, *counts, clock)", "*rates, *counts, tick)", RECORDING),
     ("viewer/recorder.py", "colony.delivered[self.world] + totals", "0 * totals", SESSION),
-    ("viewer/recorder.py", "np.full_like(self._table, np.nan)", "self._table.copy()", SESSION),
+    ("viewer/recorder.py", "        late._forget()\n", "", SESSION),
     ("viewer/recorder.py", "[new] = False", "[new] = True", RECORDING),
     (
         "viewer/recorder.py",
@@ -322,14 +321,14 @@ MUTATIONS = [
         RECORDING,
     ),
     ("viewer/frames.py", '"u2" if size < 2**16', '"u2" if size < 2**17', RECORDING),
-    ("viewer/recorder.py", "self._ended = numbers[1],", "self._ended = 0,", SESSION),
+    ("viewer/recorder.py", "self._ended = ticks,", "self._ended = 0,", SESSION),
     # Server.
     ("live/server.py", "self.in_flight >= _MOST_IN_FLIGHT", "self.in_flight < 0", SERVER),
     ("live/server.py", "not (knows or (", "not (True or (", SERVER),
     ("live/server.py", "len(host) == 1 and host[0] in hosts", "len(host) == 1", SERVER),
     ("live/server.py", "self._runs and bool(self._pages)", "self._runs", SERVER),
     ("live/server.py", "self._joined < _MOST_PAGES", "self._joined <= _MOST_PAGES", SERVER),
-    ("live/server.py", 'request["do"] in _CHANGES', "False", SERVER),
+    ("live/server.py", 'request.get("do") in _CHANGES', "False", SERVER),
     ("live/server.py", "in_a_row or before.same(session)", "in_a_row", SERVER),
     # Worlds and the grid.
     (
@@ -376,14 +375,14 @@ MUTATIONS = [
     ("analysis/results.py", "- values[1])", "- values[0])", RESULTS_OF_RUNS),
     ("studies/sweep.py", "outcome[key][..., -1]", "outcome[key][..., 0]", SWEEPS),
     # Settings.
-    ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),
+    ("settings.py", "converted <= above", "converted < above", SETTINGS),
     ("settings.py", "elif value != setting.default:", "elif False:", SETTINGS),
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "changed[setting.name] = setting.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
     # Features, and what supports them.
     ("features.py", ".intersection(supports):", ":", FEATURES),
-    ("settings.py", "if value == one.default:", "if True:", FEATURES),
+    ("settings.py", "if value == setting.default:", "if True:", FEATURES),
     # Designs.
     ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),
     ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),

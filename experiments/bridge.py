@@ -26,7 +26,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.interventions import Clear, Place
     from taichi_ants.studies import command_line
-    from taichi_ants.studies.command import run_study
+    from taichi_ants.studies.command import planned, run_study
     from taichi_ants.studies.command_line import whole_number
     from taichi_ants.studies.folder import Results
     from taichi_ants.studies.points import ColonyPoint
@@ -136,7 +136,7 @@ def tables(plan: Plan, results: Results) -> str:
     """Return the report, which needs all runs, after writing counts and figures."""
     if not results.present.all():
         raise AntsError("not all runs are there yet, and the report compares all designs; wait.")
-    arrays = results.read(f"crossings_{plan.ticks}")
+    arrays = results.read(results.study.keys, arrays=[f"crossings_{plan.ticks}"])
     found = {
         design: {
             name: np.moveaxis(arrays[f"crossings_{plan.ticks}.{BRIDGES.index(name)}"][row], 0, -1)
@@ -196,13 +196,10 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the script."""
-    command_line.run_command(lambda: start(arguments), command_line.AGAIN)
-
-
-def start(arguments: list[str] | None = None) -> None:
     """Run the study, or show its results if it is finished."""
-    run_study(parse_arguments(arguments), __file__)
+    with command_line.reporting(command_line.AGAIN):
+        settings = parse_arguments(arguments)
+        run_study(settings, planned(__file__, settings))
 
 
 if __name__ == "__main__":

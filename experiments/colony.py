@@ -51,7 +51,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.report import page
     from taichi_ants.settings import nested
     from taichi_ants.studies import command_line
-    from taichi_ants.studies.command import run_study
+    from taichi_ants.studies.command import planned, run_study
     from taichi_ants.studies.command_line import whole_number
     from taichi_ants.studies.folder import MANIFEST, PAGE, REPORT
     from taichi_ants.studies.folder import Results as Runs
@@ -312,7 +312,7 @@ def tables(plan: Plan, runs: Runs) -> str:
     }
     if not conditions:
         raise AntsError("no condition has all of its runs yet; wait for the first ones.")
-    arrays = runs.read(*COLONY)
+    arrays = runs.read(runs.study.keys, arrays=COLONY)
     of_points = {p: {n: a[row] for n, a in arrays.items()} for p, row in place_of.items()}
     values = with_bounds(conditions, of_points, seeds)
     results = Results.of(values)
@@ -325,7 +325,9 @@ def tables(plan: Plan, runs: Runs) -> str:
     policies = {}
     for condition, point in conditions.items():
         if condition.rules in COMPARED and condition.regime == JOINT:
-            q_values = runs.read("q_values", points=[place_of[point]])["q_values"][0]
+            q_values = runs.read([runs.study.keys[place_of[point]]], arrays=["q_values"])[
+                "q_values"
+            ][0]
             order = np.argsort(values[condition]["deliveries"], kind="stable")
             run = int(order[(len(seeds) - 1) // 2])
             policies[condition] = q_values[run]
@@ -419,12 +421,9 @@ def main(arguments: list[str] | None = None) -> None:
     words = sys.argv[1:] if arguments is None else arguments
     if words[:1] == ["live"]:
         commands.run("colony", words)
-    command_line.run_command(lambda: start(words), command_line.AGAIN)
-
-
-def start(arguments: Sequence[str]) -> None:
-    """Run the study, or show its results if it is finished."""
-    run_study(parse_arguments(arguments), __file__)
+    with command_line.reporting(command_line.AGAIN):
+        settings = parse_arguments(words)
+        run_study(settings, planned(__file__, settings))
 
 
 if __name__ == "__main__":

@@ -25,27 +25,26 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import numpy as np
     from paper import baselines as bounds
     from paper import figures, page, process
-    from paper.baselines import Baseline
-    from paper.claims import Audit, assess, claims_rows
+    from paper.claims import assess, claims_rows
     from paper.comparison import PAPER_WORLD, Comparison, Row
     from paper.page import Example, Seen
     from paper.report import report
-    from paper.table2 import Line, example_name, examples, summarise, summarise_behaviours, table2
+    from paper.table2 import example_name, examples, summarise, summarise_behaviours, table2
 
-    from taichi_ants import AntsError, Task, TrainingConfig, World, files, learners, train, worlds
+    from taichi_ants import AntsError, Task, TrainingConfig, files, learners, train, worlds
     from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
-    from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
-    from taichi_ants.engines.runs.training import evaluate
+    from taichi_ants.engines.runs.engine import MAX_ROLLOUT_STEPS
+    from taichi_ants.engines.runs.training import evaluate, trace_policies
     from taichi_ants.files import archives
     from taichi_ants.learners.policies import save_policy
     from taichi_ants.measures.finished import LONE, Run, values_of
     from taichi_ants.report.page import made_facts, setting_facts
     from taichi_ants.settings import all_of, nested
     from taichi_ants.studies import command_line
-    from taichi_ants.studies.command import run_study
+    from taichi_ants.studies.command import planned, run_study
     from taichi_ants.studies.command_line import whole_number
     from taichi_ants.studies.folder import MANIFEST, PAGE, REPORT, Results
-    from taichi_ants.studies.points import RunPoint, settings_of, small
+    from taichi_ants.studies.points import RunPoint, settings_of
     from taichi_ants.studies.study import Study
 
 VERSION = 1  # of the arrays that are kept of each run
@@ -120,7 +119,16 @@ def plan(options: Mapping[str, Any]) -> Plan:
     if "seed" in of_world:
         worlds.check_seed_counts(options["world"])
     world = worlds.build(options["world"], **of_world)
-    points = grid(options, world, given.get("task", {}), given.get("training", {}))
+    deliveries = DELIVERIES if options["delivery"] == "both" else (options["delivery"],)
+    tasks = [Task().replace(delivery=delivery, **given.get("task", {})) for delivery in deliveries]
+    names = "learning_rates", "discounts", "epsilons", "epsilon_decays"
+    numbers = tuple(product(*(options[name] for name in names)))
+    lengths = options["episodes"], options["max_steps"], ROLLOUTS
+    kinds = variants(options["learners"], options["planning_steps"], given.get("training", {}))
+    points = [
+        RunPoint(world, task, TrainingConfig(learner, *four, **own), *lengths)
+        for task, (learner, own), four in product(tasks, kinds, numbers)
+    ]
     if not world.reachable_foods().any():
         raise AntsError(
             f"ants cannot reach any food of the world {options['world']!r} from the queen; open a "
@@ -134,26 +142,10 @@ def plan(options: Mapping[str, Any]) -> Plan:
         name = ", ".join([name, *(f"world {one} {value}" for one, value in settings.items())])
     seeds = tuple(range(options["seed"], options["seed"] + options["seeds"]))
     arrays = *LONE, "behaviours", "policy_returns", *map(figures.sums, figures.CURVES)
-    study = Study(points, seeds, arrays, measured)
+    study = Study(tuple(points), seeds, arrays, measured)
     discounts = tuple(dict.fromkeys(options["discounts"]))
     exact = process.begin(bounds.bound_rows, world, points[0].task, discounts, points[0].max_steps)
     return Plan(study, name, exact, renders=not options["quick"])
-
-
-def grid(
-    options: Mapping[str, Any], world: World, rules: Mapping[str, Any], more: Mapping[str, Any]
-) -> tuple[RunPoint, ...]:
-    """Return the points; `rules` and `more` are settings of the task and of the training."""
-    deliveries = DELIVERIES if options["delivery"] == "both" else (options["delivery"],)
-    tasks = [Task().replace(delivery=delivery, **rules) for delivery in deliveries]
-    names = "learning_rates", "discounts", "epsilons", "epsilon_decays"
-    numbers = tuple(product(*(options[name] for name in names)))
-    lengths = options["episodes"], options["max_steps"], ROLLOUTS
-    several = variants(options["learners"], options["planning_steps"], more)
-    return tuple(
-        RunPoint(world, task, TrainingConfig(name, *four, **own), *lengths)
-        for task, (name, own), four in product(tasks, several, numbers)
-    )
 
 
 def variants(
@@ -187,7 +179,9 @@ def measured(
     """
     edges = figures.spans(points[0].episodes)[:-1]
     curves = {
-        figures.sums(name): small(np.add.reduceat(outcome[name], edges, axis=2, dtype=np.int64))
+        figures.sums(name): files.small(
+            np.add.reduceat(outcome[name], edges, axis=2, dtype=np.int64)
+        )
         for name in figures.CURVES
     }
     return {
@@ -222,30 +216,9 @@ def tables(plan: Plan, results: Results) -> str:
     rows = np.flatnonzero(results.present.all(axis=1)).tolist()
     if not rows:
         raise AntsError("no configuration has all of its runs yet; wait for the first ones.")
-    study = replace(plan.study, points=tuple(plan.study.points[row] for row in rows))
-    comparison = comparison_of(study, plan.world_name, results.read(*study.arrays, points=rows))
+    study = replace(results.study, points=tuple(results.study.points[row] for row in rows))
     first: Any = study.points[0]
-    follow, runs = partial(evaluate, arch=arch), (study.seeds, first.rollouts, first.max_steps)
-    baselines = plan.exact() + bounds.policy_rows(first.world, first.task, follow, *runs)
-    chosen = [trained(study, row, run, arch) for row, run in examples(comparison)]
-    seen: Callable[[], Seen] = Seen
-    if results.figures:
-        seen = page.begin(comparison, baselines, chosen, folder, renders=plan.renders)
-
-    lines, audit = write_tables(folder, comparison, baselines)
-    save_policies(folder / "policies", comparison, chosen)
-    shown = seen()
-    facts = {"World": comparison.world, **setting_facts(settings_of(study.points, study.seeds))}
-    links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
-    facts |= made_facts(results.made)
-    html = page.comparison_page(comparison, baselines, lines, audit, shown, facts, links)
-    files.write_text(folder / PAGE, html)
-    return report(comparison, lines, audit)
-
-
-def comparison_of(study: Study, world: str, arrays: Mapping[str, np.ndarray]) -> Comparison:
-    """Return the comparison of the arrays of all runs, with learning curves."""
-    first: Any = study.points[0]
+    arrays = results.read(study.keys, arrays=study.arrays)
     comparison = Comparison(
         rows=tuple(Row.of(point.task, point.training) for point in study.points),
         seeds=study.seeds,
@@ -256,29 +229,37 @@ def comparison_of(study: Study, world: str, arrays: Mapping[str, np.ndarray]) ->
         rollouts=first.rollouts,
         max_steps=first.max_steps,
         task=first.task,
-        world=world,
+        world=plan.world_name,
     )
-    return replace(comparison, curves=figures.curves_of(comparison, arrays))
+    comparison = replace(comparison, curves=figures.curves_of(comparison, arrays))
+    follow, runs = partial(evaluate, arch=arch), (study.seeds, first.rollouts, first.max_steps)
+    baselines = plan.exact() + bounds.policy_rows(first.world, first.task, follow, *runs)
+    chosen = [trained(study, row, run, arch) for row, run in examples(comparison)]
+    seen: Callable[[], Seen] = Seen
+    if results.figures:
+        seen = page.begin(comparison, baselines, chosen, folder, renders=plan.renders)
 
-
-def write_tables(
-    folder: Path, comparison: Comparison, baselines: Sequence[Baseline]
-) -> tuple[list[Line], Audit]:
-    """Return our table 2 and the findings on the claims, after writing all tables."""
     summaries = summarise(comparison)
     lines, audit = table2(comparison, summaries), assess(comparison)
-    for name, rows in {
-        "summary": [one.columns() for one in summaries],
+    for name, table in {
+        "summary": [summary.columns() for summary in summaries],
         "behaviours": summarise_behaviours(comparison),
-        "table2": [one.columns() for one in lines],
+        "table2": [line.columns() for line in lines],
         "claims": claims_rows(audit),
-        "baselines": [one._asdict() for one in baselines],
+        "baselines": [baseline._asdict() for baseline in baselines],
     }.items():
-        files.write_csv(folder / f"{name}.csv", rows, list(rows[0]))
-    of_runs = {name: getattr(comparison, name) for name in ("behaviours", "policy_returns")}
+        files.write_csv(folder / f"{name}.csv", table, list(table[0]))
+    of_runs = {name: arrays[name] for name in (*LONE, "behaviours", "policy_returns")}
     curves = {f"curve_{name}": curve for name, curve in comparison.curves.items()}
-    archives.write(folder / "runs.npz", {**comparison.measures, **of_runs, **curves})
-    return lines, audit
+    archives.write(folder / "runs.npz", {**of_runs, **curves})
+    save_policies(folder / "policies", comparison, chosen)
+    shown = seen()
+    facts = {"World": comparison.world, **setting_facts(settings_of(study.points, study.seeds))}
+    links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
+    facts |= made_facts(results.made)
+    html = page.comparison_page(comparison, baselines, lines, audit, shown, facts, links)
+    files.write_text(folder / PAGE, html)
+    return report(comparison, lines, audit)
 
 
 def trained(study: Study, row: int, run: int, arch: str) -> Example:
@@ -307,19 +288,14 @@ def save_policies(folder: Path, comparison: Comparison, chosen: Sequence[Example
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the script."""
-    again = "Stopped; finished runs are saved. Run the same command again to resume."
-    command_line.run_command(lambda: start(arguments), again)
-
-
-def start(arguments: list[str] | None = None) -> None:
     """Run the comparison, or show its results if it is finished."""
-    settings = parse_arguments(arguments)
-    is_new = settings.force or not (settings.out / MANIFEST).exists()
-    # With --threads 1, there is no second process either.
-    draws = is_new and not settings.no_figures and settings.threads != 1
-    with process.second(draws):
-        run_study(settings, __file__)
+    with command_line.reporting(command_line.AGAIN):
+        settings = parse_arguments(arguments)
+        is_new = settings.force or not (settings.out / MANIFEST).exists()
+        # With --threads 1, there is no second process either.
+        draws = is_new and not settings.no_figures and settings.threads != 1
+        with process.second(draws):
+            run_study(settings, planned(__file__, settings))
 
 
 if __name__ == "__main__":

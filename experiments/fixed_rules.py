@@ -14,6 +14,7 @@ from taichi_ants.studies.interruption import stoppable
 
 with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
+    import csv
     import math
     from collections.abc import Mapping, Sequence
     from dataclasses import replace
@@ -117,11 +118,11 @@ def read_study(folder: Path) -> Learned:
     They were trained in worlds of the same kind, or in open worlds if that kind has none.
     """
     learned: dict[tuple[str, str, int, str], dict[int, float]] = {}
-    for one in files.read_csv(folder / "seeds.csv"):
-        if one["regime"] == (JOINT if one["world_kind"] in WORLD_KINDS else ABROAD):
+    for row in csv.DictReader(files.read_text(folder / "seeds.csv").splitlines()):
+        if row["regime"] == (JOINT if row["world_kind"] in WORLD_KINDS else ABROAD):
             for name in MEASURES.values():
-                key = one["world_kind"], one["rules"], int(one["ants"]), name
-                learned.setdefault(key, {})[int(one["seed"])] = one[name]
+                key = row["world_kind"], row["rules"], int(row["ants"]), name
+                learned.setdefault(key, {})[int(row["seed"])] = float(row[name])
     return learned
 
 

@@ -148,7 +148,7 @@ def make_viewer(folder: Path, browser: Any) -> None:
     with tempfile.TemporaryDirectory() as place:
         path = Path(place, "colony.html")
         follow = ["--ticks", "400", "--follow", str(_FOLLOWED), "--out", str(path)]
-        render.show(render.parse_arguments([*_COLONY, *follow]))
+        render.run(render.parse_arguments([*_COLONY, *follow]))
         page = opened(browser, path.as_uri(), _WINDOW)
         page.evaluate("tick => { viewer.player.go(tick); }", _TICK)
         page.locator("#place b", has_text=str(_TICK)).wait_for()
@@ -221,12 +221,13 @@ def make_figures(folder: Path) -> None:
     from PIL import Image
 
     from taichi_ants.commands import colony as command
+    from taichi_ants.studies.command import planned, run_study
 
     results = ROOT / "results"
-    compare.start(["--out", str(results / "compare")])
-    colony.start(["study", "--out", str(results / "colony")])
-    command.live(command.parse_arguments([*MILLION, "--figure", str(results / "million.png")]))
-    bridge.start(["--out", str(results / "bridge")])
+    for script, words in ((compare, ()), (colony, ("study",)), (bridge, ())):
+        settings = script.parse_arguments([*words, "--out", str(results / script.__name__)])
+        run_study(settings, planned(script.__file__, settings))
+    command.run(command.parse_arguments([*MILLION, "--figure", str(results / "million.png")]))
     folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
         with Image.open(results / source) as image:

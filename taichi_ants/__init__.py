@@ -26,9 +26,14 @@ if TYPE_CHECKING:
     from taichi_ants.analysis.results import compare, plot, summary
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
     from taichi_ants.engines.colony.interventions import Interventions
-    from taichi_ants.engines.runs.results import Rollouts, TrainingResult
-    from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
-    from taichi_ants.engines.runs.training import continue_training, evaluate, train
+    from taichi_ants.engines.runs.results import Rollouts, Trace, TrainingResult
+    from taichi_ants.engines.runs.training import (
+        continue_training,
+        evaluate,
+        rollout,
+        trace_training,
+        train,
+    )
     from taichi_ants.envs.formats import tabulate
     from taichi_ants.errors import AntsError
     from taichi_ants.learners.config import TrainingConfig
@@ -46,9 +51,10 @@ _NAMES_IN = {
     "analysis.results": ("compare", "plot", "summary"),
     "engines.colony.colony": ("Colony", "ColonyEpisodes"),
     "engines.colony.interventions": ("Interventions",),
-    "engines.runs.results": ("Rollouts", "TrainingResult"),
-    "engines.runs.traces": ("Trace", "rollout", "trace_training"),
-    "engines.runs.training": ("continue_training", "evaluate", "train"),
+    "engines.runs.results": ("Rollouts", "Trace", "TrainingResult"),
+    "engines.runs.training": (
+        *("continue_training", "evaluate", "rollout", "trace_training", "train"),
+    ),
     "envs.formats": ("tabulate",),
     "errors": ("AntsError",),
     "learners.config": ("TrainingConfig",),
@@ -121,7 +127,7 @@ def _show_pages_in_notebooks() -> None:
 
     formatter = shell.display_formatter.formatters["text/html"]
     formatter.for_type_by_name("taichi_ants.engines.colony.colony", "Colony", page_of)
-    formatter.for_type_by_name("taichi_ants.engines.runs.traces", "Trace", page_of)
+    formatter.for_type_by_name("taichi_ants.engines.runs.results", "Trace", page_of)
     formatter.for_type_by_name("taichi_ants.viewer.frames", "Recording", page_of)
     formatter.for_type_by_name("taichi_ants.worlds.world", "World", page_of)
 

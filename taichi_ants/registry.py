@@ -20,7 +20,6 @@ class Registry(Generic[T]):
         built_in: The entries of the package by name or, with `load`, anything by their names.
         load: A function that returns the entry of the package with a name, on each use.
         reserved: Further names that you cannot register.
-        any_text: Whether names can be any text, not only words.
 
     Attributes:
         yours: The entries that you registered, by name.
@@ -33,11 +32,9 @@ class Registry(Generic[T]):
         built_in: Mapping[str, Any],
         load: Callable[[str], T] | None = None,
         reserved: Collection[str] = (),
-        any_text: bool = False,
     ) -> None:
         self.kind, self.built_in, self.yours = kind, built_in, dict[str, T]()
-        self._register, self._load = register, load
-        self._reserved, self._any_text = reserved, any_text
+        self._register, self._load, self._reserved = register, load, reserved
 
     def get(self, name: str) -> T:
         """Return the entry of this name; AntsError, with a list of all names, if there is none."""
@@ -59,10 +56,7 @@ class Registry(Generic[T]):
 
     def check_new(self, name: object) -> None:
         """Raise AntsError unless you can register an entry by this name."""
-        if not self._any_text:
-            check_word(f"the name of the {self.kind}", name)
-        elif not isinstance(name, str) or not name.strip():
-            raise AntsError(f"the name of the {self.kind} is {shown(name)}; it must be text.")
+        check_word(f"the name of the {self.kind}", name)
         if name in self.built_in or name in self._reserved:
             raise AntsError(
                 f"{name!r} is the name of a built-in {self.kind}, which cannot be replaced; choose "

@@ -156,8 +156,12 @@ class DeclaredSetting(NamedTuple):
         converted = self._converted(value)
         if converted is None:
             self._refuse(value, self.allowed)
-        if self.kind in (int, float) and not self._in_range(converted):
-            self._refuse(value, self._range)
+        if self.kind in (int, float):
+            least, most, above = self.rule.least, self.rule.most, self.rule.above
+            is_outside = least is not None and converted < least
+            is_outside |= above is not None and converted <= above
+            if is_outside or (most is not None and converted > most):
+                self._refuse(value, self._range)
         return converted
 
     def _converted(self, value: Any) -> Any:
@@ -199,14 +203,6 @@ class DeclaredSetting(NamedTuple):
         if len(entries) > (most := entry.most_entries):  # type: ignore[attr-defined]
             self._refuse(list(entries), f"{self.allowed}, at most {most}")
         return Named(entries)
-
-    def _in_range(self, value: float) -> bool:
-        rule = self.rule
-        return (
-            (rule.least is None or value >= rule.least)
-            and (rule.most is None or value <= rule.most)
-            and (rule.above is None or value > rule.above)
-        )
 
     def _refuse(self, value: Any, allowed: str) -> None:
         has_none = self.optional and self.rule.only is None and not self.is_group
@@ -265,13 +261,14 @@ class Settings:
 
     def __new__(cls, /, *values: Any, **named: Any) -> Any:
         known = cls.__dataclass_fields__  # type: ignore[attr-defined]
-        for name in named.keys() - known.keys():
-            raise AntsError(f"`{_below(cls.path, name)}` {not_a_setting(name, known)}")
+        for name in named:  # Python's own message has no path and no similar names
+            if name not in known:
+                raise AntsError(f"`{_below(cls.path, name)}` {not_a_setting(name, known)}")
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
         self.check()
-        for fault in self.faults():
+        for fault in self._faults():
             raise AntsError(fault)
 
     def __repr__(self) -> str:
@@ -300,26 +297,22 @@ class Settings:
         for setting in declared(type(self)):
             object.__setattr__(self, setting.name, setting.checked(getattr(self, setting.name)))
         for setting in declared(type(self)):
-            if setting.rule.only is not None:
-                self._fill_or_refuse(setting)
+            if setting.rule.only is None:
+                continue
+            other, *values = setting.rule.only
+            value = getattr(self, setting.name)
+            if getattr(self, other) in values:
+                if value is None:
+                    object.__setattr__(self, setting.name, setting.rule.usual)
+            elif value != setting.default:
+                raise AntsError(
+                    f"`{setting.path}` is {shown(value)}; leave it out unless `{other}` is "
+                    f"{_either(map(repr, values))}."
+                )
 
-    def faults(self) -> Iterator[str]:
+    def _faults(self) -> Iterator[str]:
         """Yield messages about combinations of values that are not allowed."""
         yield from ()
-
-    def _fill_or_refuse(self, setting: DeclaredSetting) -> None:
-        """Refuse a setting that has no effect; replace None by the usual value if it has one."""
-        assert setting.rule.only is not None
-        other, *values = setting.rule.only
-        value = getattr(self, setting.name)
-        if getattr(self, other) in values:
-            if value is None and setting.rule.usual is not None:
-                object.__setattr__(self, setting.name, setting.rule.usual)
-        elif value != setting.default:
-            raise AntsError(
-                f"`{setting.path}` is {shown(value)}; leave it out unless `{other}` is "
-                f"{_either(map(repr, values))}."
-            )
 
     def uses(self) -> dict[str, str]:
         """Return the features in use, each with the words of messages about it.
@@ -436,8 +429,13 @@ def _read(cls: Any) -> tuple[DeclaredSetting, ...]:
             continue
         kind, *rules = get_args(hint)
         rule = reduce(Setting.replace, rules)
-        entry = get_args(kind)[0] if get_origin(kind) is Named else NoneType
-        kind, words, optional = _kind_of(kind)
+        optional = get_origin(kind) in (Union, UnionType)
+        if optional:
+            (kind,) = [part for part in get_args(kind) if part is not NoneType]
+        origin, inner = get_origin(kind), get_args(kind)
+        words = inner if origin is Literal else ()
+        entry = inner[0] if origin is Named else NoneType
+        kind = {Literal: str, Named: Named, Sequence: list}.get(origin, kind)
         path = _below(getattr(cls, "path", "world"), name)  # functions build worlds
         settings.append(DeclaredSetting(name, path, kind, words, optional, default, rule, entry))
     return tuple(settings)
@@ -523,17 +521,6 @@ def nested(named: Mapping[str, Any]) -> dict[str, Any]:
         else:
             branch[last] = value
     return tree
-
-
-def _kind_of(hint: Any) -> tuple[type, tuple[str, ...], bool]:
-    optional = get_origin(hint) in (Union, UnionType)
-    if optional:
-        (hint,) = [part for part in get_args(hint) if part is not NoneType]
-    if get_origin(hint) is Literal:
-        return str, get_args(hint), optional
-    if get_origin(hint) is Named:
-        return Named, (), optional
-    return list if get_origin(hint) is Sequence else hint, (), optional
 
 
 def _below(path: str, name: object) -> str:

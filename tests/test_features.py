@@ -25,7 +25,7 @@ from taichi_ants import (
 )
 from taichi_ants.analysis.bounds.episodes import EpisodeBounds
 from taichi_ants.analysis.bounds.limits import limits_of
-from taichi_ants.engines.runs.traces import trace_policies
+from taichi_ants.engines.runs.training import trace_policies
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv

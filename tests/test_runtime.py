@@ -111,11 +111,10 @@ refused("destroy all fields and arrays")
 ti.reset()
 assert same()
 
-for types in ({"default_fp": ti.f64}, {"default_fp": ti.f16}, {"default_ip": ti.i64}):
-    init(offline_cache=False, **types)
-    assert same()
-    for now in (ti.lang.impl.current_cfg(), ti.lang.impl.get_runtime()):
-        assert all(getattr(now, name) == one for name, one in types.items())  # still the caller's
+init(offline_cache=False, default_fp=ti.f64, default_ip=ti.i64)
+assert same()
+for now in (ti.lang.impl.current_cfg(), ti.lang.impl.get_runtime()):
+    assert (now.default_fp, now.default_ip) == (ti.f64, ti.i64)  # still the caller's
 """
     python(BEGINNING + script, tmp_path, PYTHONWARNINGS="ignore")
 
@@ -148,13 +147,15 @@ def said_by(work):
 assert in_a_fork(trained) == "done"
 table = trained().q_values[0, 0]
 colony = Colony(paper(), None, config, ants=4)
+colony.begin_episode()
+snapshot = colony.snapshot()
 scene = Scene(paper().grid, (200, 160))
 for work in (
     trained,
     lambda: rollout(paper(), table),
     lambda: Colony(paper(), None, config, ants=4),
     lambda: colony.run(1, 10),
-    lambda: scene.draw(colony.snapshot()),
+    lambda: scene.draw(snapshot),
 ):
     said = in_a_fork(work)
     assert said.startswith("this process was forked") and '"spawn"' in said, said
@@ -180,7 +181,7 @@ tiny = sys.float_info.min
 trained()
 
 import taichi as ti
-from taichi_ants.engines.arguments import Launch
+from taichi_ants.engines.launch import Launch
 
 assert tiny / 2 > 0.0 and np.float64(tiny) / 2 > 0.0
 

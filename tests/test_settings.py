@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from command_lines import ROOT
 
-from taichi_ants import AntsError, At, TrainingConfig, learners
+from taichi_ants import AntsError, TrainingConfig, learners
 from taichi_ants.settings import (
     DeclaredSetting,
     Named,
@@ -27,7 +27,7 @@ from taichi_ants.settings import (
     named_groups,
     nested,
 )
-from taichi_ants.task import Field, Pheromone, Task, Threshold, Traffic
+from taichi_ants.task import Task
 from taichi_ants.worlds import double_bridge, open_world
 
 KINDS = (Task, TrainingConfig, open_world, double_bridge)
@@ -190,36 +190,6 @@ def test_sentences(make, says):
     assert refused(make) == f"`kitchen{says}"
 
 
-def test_the_rules_of_a_task_that_depend_on_each_other():
-    for make in (
-        lambda: Pheromone(half_life=10),
-        lambda: Pheromone("none", half_life=10),
-        lambda: Pheromone(cap=10),
-        lambda: Pheromone(slope=10),
-        lambda: Pheromone(deposit="none", level=3),
-        lambda: Traffic(reward_pushed=True),
-        lambda: Traffic(carriers_first=True),
-    ):
-        assert re.fullmatch(r"`task\.\w+\.\w+` is .*; leave it out unless .*\.", refused(make))
-    assert Task(traffic="following").traffic == Traffic(True, True, True, True)
-
-
-def test_cues_are_fields_of_the_task():
-    home = {"home": {"deposited_when": "without_food"}}
-    task = Task(fields=home, homing_cue="home")
-    assert task == Task().replace(fields=home, homing_cue="home") == Task.from_dict(task.as_dict())
-    assert task.fields["home"] == Field(deposited_when="without_food")
-    end = "or the name of a field that you add to `task.fields`."
-    for wrong, cues in (("hoem", "compass, trail, home"), ("", "compass, trail, home")):
-        says = f"`task.homing_cue` is {wrong!r}; it must be one of {cues}, {end}"
-        assert refused(lambda wrong=wrong: task.replace(homing_cue=wrong)) == says
-    says = f"`task.outbound_cue` is 'compass'; it must be one of trail, {end}"
-    assert refused(lambda: Task(outbound_cue="compass")) == says
-    for name in ("trail", "compass", "all", "none"):
-        says = f"`task.fields` has a field {name!r}, but that name is taken; choose another name."
-        assert refused(lambda name=name: Task(fields={name: {}})) == says
-
-
 def test_the_page_of_settings_is_made_from_the_declarations():
     page = (ROOT / "docs" / "settings.md").read_text()
     for kind in KINDS:
@@ -227,31 +197,3 @@ def test_the_page_of_settings_is_made_from_the_declarations():
     for name in learners.names():
         if declared(learners.get(name).hyperparameters):
             assert table(learners.get(name).hyperparameters) in page
-
-
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (lambda: Field(slop=3), "`task.fields.NAME.slop` is not a setting; choose slope."),
-        (lambda: Task(fiels={}), "`task.fiels` is not a setting; choose fields."),
-        (lambda: At(3, remove_ant=3), "`at.remove_ant` is not a setting; choose remove_ants."),
-        (
-            lambda: Threshold().replace(valu=1),
-            "`task.castes.NAME.threshold.valu` is not a setting; choose value.",
-        ),
-        (
-            lambda: Task(castes={"scout": {"threshold": {"valu": 3}}}),
-            "`task.castes.scout.threshold.valu` is not a setting; choose value.",
-        ),
-        (
-            lambda: Task(castes={"scout": {"threshold": -1}}),
-            "`task.castes.scout.threshold.value` is -1; it must be between 0 and 1e+06.",
-        ),
-        (
-            lambda: Task(castes={"scout": 3}),
-            "`task.castes.scout` is 3; it must be a table of settings.",
-        ),
-    ],
-)
-def test_unknown_and_wrong_settings_are_named(make, says):
-    assert refused(make) == says

@@ -24,7 +24,7 @@ FEAR, AMOUNT = 2.0, 100
 HALF_LIVES = (200.0, 50.0)  # of the path, in ticks
 
 
-@rules.register("deposit", summary="mark cells after a search in vain")
+@rules.register("deposit")
 def no_entry(
     level,
     carried,
@@ -35,7 +35,7 @@ def no_entry(
     return max(level, amount) if carried > patience else level
 
 
-@rules.register("choice", summary="follow the trail, and avoid the repellent")
+@rules.register("choice")
 def wary(
     codes,
     levels,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from policy_sheet import policy_sheet
@@ -78,42 +78,44 @@ def begin(
     This process follows the policies, because it has compiled the kernel. The second process draws
     the animations or, without them, the figures.
     """
-    played = [one.played() for one in examples]
+    played = [example.played() for example in examples]
     draw = partial if renders else process.begin
-    calls = [draw(figures.save_all, comparison, baselines, folder / "figures")]
+    calls: dict[Any, process.Begun] = {
+        "figures": draw(figures.save_all, comparison, baselines, folder / "figures")
+    }
     for (row, run, point, *_), episode in zip(examples, played if renders else (), strict=False):
         path = files.check_writable_folder(folder / "renders")
         path /= f"{example_name(comparison, row, run)}.gif"
         # The animation shows the name of the episode next to the world.
         named = replace(episode, name=BEHAVIOURS[comparison.behaviours[row, run]])
         title = f"{comparison.rows[row].variant.label}, {point.task.delivery}"
-        calls.append(process.begin(render, path, named, title))
+        calls[path] = process.begin(render, path, named, title)
     first: dict[int, tuple[Example, Episode]] = {}
-    for one, episode in zip(examples, played, strict=True):
-        first.setdefault(int(comparison.behaviours[one.row, one.run]), (one, episode))
-    done, recorded, sheets = counts(comparison.behaviours), [], []
-    for code, (one, episode) in sorted(first.items()):
-        _, variant, grid = comparison.rows[one.row]
+    for example, episode in zip(examples, played, strict=True):
+        first.setdefault(int(comparison.behaviours[example.row, example.run]), (example, episode))
+    done, captions = counts(comparison.behaviours), dict[Any, Any]()
+    for code, (example, episode) in sorted(first.items()):
+        _, variant, grid = comparison.rows[example.row]
         whose = (
-            f"{variant.label}, delivery {one.point.task.delivery}, seed {one.seed}, {grid.label} "
-            "(learning rate / discount / epsilon / decay)"
+            f"{variant.label}, delivery {example.point.task.delivery}, seed {example.seed}, "
+            f"{grid.label} (learning rate / discount / epsilon / decay)"
         )
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Shown: {whose}."
-        recording = process.begin(record_trace, episode.trace, BEHAVIOURS[code])
-        recorded.append((sentence(BEHAVIOURS[code]), words, recording))
+        captions[code] = sentence(BEHAVIOURS[code]), words
+        calls[code] = process.begin(record_trace, episode.trace, BEHAVIOURS[code])
         if code == DELIVERS:
-            title = f"{variant.label}: policy"
-            sheet = process.begin(policy_sheet, one.q_values, title, task=one.point.task)
-            sheets.append((f"The policy of an ant: {whose}", sheet))
-    drawn = draw(figures.for_page, comparison, baselines)
+            title, task = f"{variant.label}: policy", example.point.task
+            captions["sheet"] = (f"The policy of an ant: {whose}",)
+            calls["sheet"] = process.begin(policy_sheet, example.q_values, title, task=task)
+    calls["drawings"] = draw(figures.for_page, comparison, baselines)
 
     def wait() -> Seen:
         with progress_bar("pictures") as progress:
-            process.wait_for(calls, progress)
-        players = [Player(title, words, one()) for title, words, one in recorded]
-        sheet = next((Picture(words, one()) for words, one in sheets), None)
-        return Seen(drawn(), players, sheet)
+            results = process.results_of(calls, progress)
+        players = [Player(*captions[code], results[code]) for code in sorted(first)]
+        sheet = Picture(*captions["sheet"], results["sheet"]) if "sheet" in results else None
+        return Seen(results["drawings"], players, sheet)
 
     return wait
 

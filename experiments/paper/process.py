@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
@@ -30,21 +30,29 @@ def second(wanted: bool) -> Iterator[None]:
 def begin(call: Callable[..., Any], *given: Any, **named: Any) -> Begun:
     """Return a function that waits for the result of a call, which the second process runs.
 
-    Without one, the call runs here, when the function is called. The called function must be at the
-    top level of a module of this folder or of the package.
+    The call runs here, when the function is called, if the second process has not begun it, or if
+    there is none. The called function must be at the top level of a module of this folder or of the
+    package.
     """
     here = partial(call, *given, **named)
-    return _process.submit(here).result if _process else here
+    if _process is None:
+        return here
+    future = _process.submit(here)
+    return lambda: here() if future.cancel() else future.result()
 
 
-def wait_for(calls: Sequence[Begun], progress: Callable[[float], None]) -> None:
-    """Wait for calls that have begun; raises an error of one after all have ended."""
-    errors = []
-    for number, call in enumerate(calls):
-        progress(number / len(calls))
+def results_of(calls: Mapping[Any, Begun], progress: Callable[[float], None]) -> dict[Any, Any]:
+    """Return the results of calls that have begun; raises an error of one after all have ended.
+
+    The last ones come first, because the second process has not begun them.
+    """
+    results, errors = dict[Any, Any](), list[Exception]()
+    for name, call in reversed(calls.items()):
+        progress((len(results) + len(errors)) / len(calls))
         try:
-            call()
+            results[name] = call()
         except Exception as error:
             errors.append(error)
     if errors:
-        raise errors[0]
+        raise errors[-1]
+    return results

@@ -14,7 +14,7 @@ import numpy as np
 from taichi_ants.task.constants import N_STATES, RIGHT, SEES_CUE
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.runs.traces import Trace
+    from taichi_ants.engines.runs.results import Trace
 
 # A behaviour is an index into this list.
 BEHAVIOURS = ("delivers", "walks the trail", "circles with food", "other")

@@ -23,22 +23,22 @@ COMMANDS = {  # modules of this package with their help
 }
 
 
-def run(
-    name: str, arguments: Sequence[str] | None = None, program: str | None = None, **more: object
-) -> None:
+def run(name: str, arguments: Sequence[str] | None = None, program: str | None = None) -> None:
     """Run a command and exit; Ctrl-C also works during its imports.
 
-    `program` is the name of the command in --help, by default that of the script; `more` are
-    further arguments of the command's `main`.
+    A command has the functions `parse_arguments` and `run`, and perhaps `STOPPED`, which it prints
+    if a signal stops it. `program` is its name in --help, by default that of the script.
     """
     # Commands use all cores themselves, so OpenBLAS should not start threads; it reads this at the
     # import of NumPy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with stoppable():
-        from taichi_ants.studies.command_line import Parser
+        from taichi_ants.studies.command_line import Parser, reporting
 
         Parser.program = program
-        import_module(f"{__name__}.{name.replace('-', '_')}").main(arguments, **more)
+        command = import_module(f"{__name__}.{name}")
+        with reporting(getattr(command, "STOPPED", "Stopped.")):
+            command.run(command.parse_arguments(arguments))
 
 
 def main() -> None:

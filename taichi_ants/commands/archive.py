@@ -24,7 +24,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def archive(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Write the archive, and print what it contains."""
     from taichi_ants.files import check_writable_file, check_writable_folder
     from taichi_ants.report.odd import odd_of
@@ -39,8 +39,3 @@ def archive(settings: argparse.Namespace) -> None:
     number = write(check_writable_file(out), settings.folder, manifest, odd)
     print(f"{out}: {number} files ({out.stat().st_size / 1e6:.1f} MB)")
     print(f"To repeat the study and compare: taichi-ants reproduce {out}")
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
-    command_line.run_command(lambda: archive(parse_arguments(arguments)))

@@ -30,7 +30,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return settings
 
 
-def check(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Try everything that the file registers."""
     from taichi_ants import learners, rules
     from taichi_ants.errors import AntsError
@@ -64,13 +64,8 @@ def _results(
     from taichi_ants.testing import check_learner, check_observation, check_rule
 
     of_rules = (check_rule(name, inputs) for name in rules)
-    for one in chain(of_rules, map(check_observation, observations)):
-        yield str(one), one.difference
+    for comparison in chain(of_rules, map(check_observation, observations)):
+        yield str(comparison), comparison.difference
     for name in learners:
         fault = check_learner(name)
         yield f"{name}: 2000 steps: {fault or 'no fault'}", fault
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
-    command_line.run_command(lambda: check(parse_arguments(arguments)))

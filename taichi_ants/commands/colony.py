@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies import command_line
@@ -30,59 +29,25 @@ _OF_RESUMED = ("resume", "ticks", "frame_interval", "plugin", "threads", "arch",
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
-    parser = command_line.Parser(__doc__)
-    kinds = parser.add_subparsers(metavar="live", required=True)
+    main = command_line.Parser(__doc__)
+    kinds = main.add_subparsers(metavar="live", required=True)
     about = "run one colony, or many in parallel"
-    live = kinds.add_parser("live", help=about, description=f"{about.capitalize()}.")
-    _add_live(live)
-    settings, given = parser.parse_given(arguments)
-    _check_live(settings, given, parser.error)
-    return settings
-
-
-def _check_live(
-    settings: argparse.Namespace, given: Mapping[str, str], error: Callable[[str], NoReturn]
-) -> None:
-    for name, flag in given.items():
-        if settings.resume and name not in _OF_RESUMED:
-            error(f"{flag} cannot change a resumed colony; leave it out")
-        learns = name.startswith("training.") and name != "training.epsilon"
-        if settings.sharing == "frozen" and learns:
-            error(
-                f"{flag} has no effect with --sharing frozen (no learning); leave one of them out"
-            )
-    if settings.policy and "task.observation" in given:
-        error(
-            "--task.observation has no effect with --policy, because the file determines the "
-            "observation; leave one of them out"
-        )
-    if "frame_interval" in given and (
-        not settings.render or settings.render.lower().endswith(".png")
-    ):
-        picture = settings.render or "missing"
-        error(
-            f"--frame-interval requires an animation, but --render is {picture}; name a .gif or "
-            ".mp4 file"
-        )
-
-
-def _add_live(parser: command_line.Parser) -> None:
+    parser = kinds.add_parser("live", help=about, description=f"{about.capitalize()}.")
     add = parser.add_argument
     add("--ants", **COUNT, default=80, help="number of ants per colony at the start")
     ticks: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
     add("--ticks", **ticks, default=1000, help="number of ticks to run")
-    add(
-        "--colonies", **COUNT, default=1, help="number of separate colonies, each with its own seed"
-    )
+    colonies = "number of separate colonies, each with its own seed"
+    add("--colonies", **COUNT, default=1, help=colonies)
     add("--seed", type=whole_number(), default=0, metavar="N", help="first seed")
     start = "place ants near the queen (nest) or anywhere (spread)"
     add("--start", choices=("nest", "spread"), default="nest", help=start)
     add("--world", default="open", metavar="WORLD", help=command_line.WORLDS)
-    sharings = ("shared", "independent", "frozen")
     sharing = (
         "all ants learn into one table of action values (shared), each into its own (independent), "
         "or no ant learns (frozen)"
     )
+    sharings = ("shared", "independent", "frozen")
     add("--sharing", choices=sharings, default="shared", help=sharing)
     add("--policy", metavar="FILE", help="policy file (.npz) with the action values at the start")
     capacity = (
@@ -107,12 +72,22 @@ def _add_live(parser: command_line.Parser) -> None:
     command_line.add_settings(parser, queueing())
     command_line.add_settings(parser, _LEARNING)
 
+    settings, given = main.parse_given(arguments)
+    for name, flag in given.items():
+        learns = name.startswith("training.") and name != "training.epsilon"
+        if settings.resume and name not in _OF_RESUMED:
+            main.error(f"{flag} cannot change a resumed colony; leave it out")
+        if settings.sharing == "frozen" and learns:
+            main.error(f"{flag} has no effect with --sharing frozen; leave one of them out")
+        if settings.policy and name == "task.observation":
+            main.error(f"the file of --policy determines the observation; leave out {flag}")
+    return settings
 
-def live(settings: argparse.Namespace) -> None:
+
+def run(settings: argparse.Namespace) -> None:
     """Run a colony and print a summary; a signal stops it between two ticks."""
     from taichi_ants import Colony
-    from taichi_ants.studies.one_colony import check_places, summary
-    from taichi_ants.studies.one_colony import live as run
+    from taichi_ants.studies.one_colony import check_places, live, summary
 
     load_plugin(settings.plugin)
     files = settings.save, settings.render, settings.figure
@@ -124,7 +99,7 @@ def live(settings: argparse.Namespace) -> None:
     begun, began = colony.ticks, time.perf_counter()
     with held() as stopped:
         with command_line.progress_bar("colony") as progress:
-            run(colony, settings.ticks, progress, stopped, *files, settings.frame_interval)
+            live(colony, settings.ticks, progress, stopped, *files, settings.frame_interval)
         print(summary(colony, colony.ticks - begun, time.perf_counter() - began))
         for path in filter(None, files):
             print(f"Wrote {path}.")
@@ -147,10 +122,6 @@ def new_colony(settings: argparse.Namespace) -> Colony:
             f"--task.choice.rule is {task.choice.rule}, by which ants choose without learning; "
             "leave out --policy and the options of --training."
         )
-    if settings.sharing == "frozen" and policy is None and not learns_nothing:
-        raise AntsError(
-            "--sharing frozen requires a policy; add --policy FILE, or choose another --sharing."
-        )
     names = ("ants", "capacity", "start", "sharing", "threads", "arch")
     options: dict[str, Any] = {name: getattr(settings, name) for name in names}
     seeds = range(settings.seed, settings.seed + settings.colonies)
@@ -170,8 +141,3 @@ def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
     if policy:
         base = replace(base, observation=policy.observation)
     return base.replace(**command_line.given_settings(settings).get("task", {}))
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
-    command_line.run_command(lambda: live(parse_arguments(arguments)))

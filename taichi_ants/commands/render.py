@@ -23,7 +23,6 @@ from taichi_ants.studies.command_line import (
     given_settings,
     given_world,
     progress_bar,
-    run_command,
     whole_number,
 )
 from taichi_ants.studies.plugins import load_plugin
@@ -41,6 +40,9 @@ KINDS = {  # description and example of each subcommand
     "episode": ("render an ant with a fixed policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
     "colony": ("render many ants with the same fixed policy", "--ants 200 --out ants.gif"),
 }
+
+
+STOPPED = "Stopped; nothing was left behind."
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -113,9 +115,6 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         flags = OPTIONS.keys() - (_MANY if kind == "episode" else _LONE)
         add_options(of_kind, flags, kind=kind, **_DEFAULTS[kind])
     settings = parse(parser, arguments)
-    for flag in ("follow", "title") if not settings.overlay else ():
-        if getattr(settings, flag, None) is not None:
-            parser.error(f"--{flag} has no effect with --no-overlay, so use only one")
     if settings.kind == "colony" and settings.frame_interval is None:
         # A page shows the action of each ant only if it records every tick.
         settings.frame_interval = 1 if is_page(settings) else 4
@@ -128,8 +127,6 @@ def parse(parser: Parser, arguments: list[str] | None = None) -> argparse.Namesp
     for flag in given.values():
         if flag.startswith(_OF_TRAINING) and getattr(settings, "policy", None):
             parser.error(f"{flag} configures training, but --policy replaces it, so use only one")
-        if flag in ("--size", "--fps", "--no-overlay") and is_page(settings):
-            parser.error(f"{flag} has no effect on a page, so leave it out or write a .gif file")
     return settings
 
 
@@ -138,7 +135,7 @@ def is_page(settings: argparse.Namespace) -> bool:
     return Path(settings.out).suffix.lower() == ".html"
 
 
-def show(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Write the file that the settings describe, and print a summary."""
     from taichi_ants.rendering import check_animation, check_picture
     from taichi_ants.rendering.scene import check_size
@@ -263,8 +260,3 @@ def save_frames(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n:
 
     with progress_bar("Rendering") as progress:
         save_animation(settings.out, counted(), settings.fps, pause=PAUSE)
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command line."""
-    run_command(lambda: show(parse_arguments(arguments)), "Stopped; nothing was left behind.")

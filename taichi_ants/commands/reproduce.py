@@ -14,6 +14,8 @@ from pathlib import Path
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 
+STOPPED = command_line.AGAIN
+
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
@@ -30,38 +32,32 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def reproduce(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Repeat the study, print the comparison, and exit with status 1 if a file differs."""
     from taichi_ants.studies import archive, folder
-    from taichi_ants.studies.command import compute, opened
+    from taichi_ants.studies.command import opened, run_study
 
     out = settings.out or Path("results", f"reproduced-{settings.file.stem}")
-    if folder.manifest_in(out):
+    if (out / folder.MANIFEST).exists():
         raise AntsError(f"{str(out)!r} has finished results; choose another --out.")
-    with archive.unpacked(settings.file) as place:
-        asked, manifest = folder.asked_in(place) or {}, archive.finished(place)
-        if code := sorted(place.glob(f"{folder.INPUTS}/*/**/*.py")):
-            names = [f"{archive.RESULTS}/{path.relative_to(place).as_posix()}" for path in code]
-            words = ", ".join(
-                f"{name} (SHA-256 {folder.checksum_of(path)[:16]}...)"
-                for name, path in zip(names, code, strict=True)
-            )
+    with archive.unpacked(settings.file) as path:
+        manifest = archive.finished(path)
+        if code := sorted(path.glob(f"{folder.INPUTS}/*/**/*.py")):
+            names = ", ".join(f"{archive.RESULTS}/{file.relative_to(path)}" for file in code)
             if not settings.trust_code:
                 raise AntsError(
-                    f"the study runs code of the archive, {words}; read it, for example with "
+                    f"the study runs code of the archive, {names}; read it, for example with "
                     "`unzip -p`, and give --trust-code to run it."
                 )
-            command_line.notice(f"Running code of the archive: {words}.")
+            command_line.notice(f"Running code of the archive: {names}.")
         if versions := archive.other_versions(manifest):
             command_line.notice(f"These versions differ from those of the archive: {versions}.")
-        with opened(place) as found:
-            folder.ask(out, asked, found.inputs, force=False)
-            settings.arch = asked["arch"]
-            how = manifest["figures"], manifest["parquet"]
-            if not compute(settings, found, out, *how):
-                print(f"Shard {settings.shard} is finished in {out}/.")
+        with opened(path) as planned:
+            more = {"no_figures": not manifest["figures"], "parquet": manifest["parquet"]}
+            more |= {"out": out, "force": False, "arch": planned.facts["arch"]}
+            if not run_study(argparse.Namespace(**vars(settings) | more), planned):
                 return
-        compared = list(archive.compare(place, out))
+        compared = list(archive.compare(path, out))
     for name, difference, note in compared:
         words = f"({difference or note})" if difference or note else ""
         print(f"{'DIFFERENT' if difference else 'equal':9}  {name} {words}".rstrip())
@@ -69,8 +65,3 @@ def reproduce(settings: argparse.Namespace) -> None:
         print(f"{different} of {len(compared)} files differ: the study is not reproduced.")
         sys.exit(1)
     print(f"All {len(compared)} files are equal: the study is reproduced.")
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
-    command_line.run_command(lambda: reproduce(parse_arguments(arguments)), command_line.AGAIN)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 
 
@@ -20,24 +19,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def status(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Print the state of each folder."""
     from taichi_ants.studies.folder import status as status_of
 
-    wrong: list[AntsError] = []
     for folder in settings.folders:
-        try:
-            lines = list(status_of(folder))
-        except AntsError as error:
-            wrong.append(error)
-            continue
-        print(folder, *(f"  {line}" for line in lines), sep="\n")
-    for one in wrong[:-1]:
-        command_line.notice(f"error: {one}")
-    if wrong:
-        raise wrong[-1]
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
-    command_line.run_command(lambda: status(parse_arguments(arguments)))
+        print(folder, *(f"  {line}" for line in status_of(folder)), sep="\n")

@@ -12,39 +12,24 @@ from pathlib import Path
 
 from taichi_ants.studies import command_line
 
+STOPPED = command_line.AGAIN
 
-def parse_arguments(
-    arguments: list[str] | None = None, file: Path | None = None, about: str | None = None
-) -> argparse.Namespace:
-    """Return the settings of the command line; a script for one sweep gives `file` and `about`."""
-    parser = command_line.Parser(about or __doc__)
-    if file is None:
-        parser.add_argument("file", type=Path, metavar="FILE", help="sweep to run (.toml)")
-    parser.set_defaults(**({"file": file} if file else {}))
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """Return the settings of the command line."""
+    parser = command_line.Parser(__doc__)
+    parser.add_argument("file", type=Path, metavar="FILE", help="sweep to run (.toml)")
     command_line.add_common(parser)
     command_line.add_machines(parser)
-    name = f"sweep-{file.stem}" if file else "sweep-NAME for the file NAME.toml"
-    command_line.add_results(parser, name, quick=False)
+    command_line.add_results(parser, "sweep-NAME for the file NAME.toml", quick=False)
     also = "write the tables as Parquet, too (extra parquet)"
     parser.add_argument("--parquet", action="store_true", help=also)
     settings = parser.parse_args(arguments)
     return command_line.with_folder(settings, f"sweep-{settings.file.stem}")
 
 
-def sweep(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
-    from taichi_ants.files.tables import check_parquet
-    from taichi_ants.studies.command import run_study
+    from taichi_ants.studies.command import planned, run_study
 
-    if settings.parquet:
-        check_parquet()
-    run_study(settings, "taichi_ants.studies.sweep")
-
-
-def main(
-    arguments: list[str] | None = None, file: Path | None = None, about: str | None = None
-) -> None:
-    """Run the command; the arguments are those of `parse_arguments`."""
-    command_line.run_command(
-        lambda: sweep(parse_arguments(arguments, file, about)), command_line.AGAIN
-    )
+    run_study(settings, planned("taichi_ants.studies.sweep", settings))

@@ -22,23 +22,18 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def tables(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Write the tables, and print the report."""
     from taichi_ants.files import read_text
     from taichi_ants.studies.command import opened, write_tables
     from taichi_ants.studies.folder import REPORT
     from taichi_ants.studies.store import Store
 
-    with opened(settings.folder) as found:
+    with opened(settings.folder) as planned:
         store = Store(settings.folder)
-        missing = int(found.study.missing(store).sum())
+        missing = int(planned.study.missing(store).sum())
         options = not settings.no_figures, settings.parquet, missing > 0
-        write_tables(settings.folder, found, store, *options)
+        write_tables(settings.folder, planned, store, *options)
     print(read_text(settings.folder / REPORT))
     if missing:
         print(f"{missing} runs are missing; `taichi-ants status` shows how long they take.")
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
-    command_line.run_command(lambda: tables(parse_arguments(arguments)))

@@ -26,7 +26,6 @@ from taichi_ants.studies.command_line import (
     THREADS,
     Parser,
     progress_bar,
-    run_command,
     whole_number,
 )
 from taichi_ants.studies.interruption import stop_if_noted
@@ -86,36 +85,17 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return settings
 
 
-def play(settings: argparse.Namespace) -> None:
-    """Compute a run of a study again, and write a page that plays it."""
-    from taichi_ants.studies.command import opened
-    from taichi_ants.studies.replay import replay, run_of
-    from taichi_ants.studies.store import Store
-    from taichi_ants.viewer import save_page
-
-    folder, number = settings.folder, settings.row
-    with opened(folder) as found:
-        order = getattr(found.own, "order", [*range(len(found.study.points))])
-        point, seed = run_of(found.study, order, number)
-        where = {"threads": settings.threads, "arch": found.facts["arch"]}
-        title = f"Row {number} of {folder.name}"
-        recording, values = replay(found.study, Store(folder), point, seed, title, **where)
-    path = folder / f"row-{number}.html"
-    save_page(path, recording)
-    print(f"seed {found.study.seeds[seed]}")
-    for name, array in values.items():
-        if array[0, 0].ndim == 0:
-            print(f"{name} {array[0, 0]:g}")
-    print(f"The new numbers are those of the row. Open {path} to see its first episode.")
-
-
-def watch(settings: argparse.Namespace) -> None:
-    """Serve the page until the session ends."""
+def run(settings: argparse.Namespace) -> None:
+    """Serve the page until the session ends, or play a row of a folder of results."""
     from taichi_ants import runtime
     from taichi_ants.live.choices import Choices
     from taichi_ants.live.server import SessionServer
     from taichi_ants.live.session import Session
+    from taichi_ants.studies.replay import play
 
+    if settings.folder is not None:
+        play(settings.folder, settings.row, settings.threads)
+        return
     load_plugin(settings.plugin)
     choices = Choices(policies(settings.policy))
     runtime.start(settings.threads)
@@ -166,9 +146,3 @@ def _opened(url: str) -> Iterator[None]:
         path.write_text(_LEADS.replace("ADDRESS", url), encoding="utf-8")
         webbrowser.open(path.as_uri())
         yield
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command line."""
-    settings = parse_arguments(arguments)
-    run_command(lambda: watch(settings) if settings.folder is None else play(settings))

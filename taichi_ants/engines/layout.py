@@ -49,6 +49,8 @@ class Command(IntEnum):
 # The result of a step in a rollout is one byte: its event, and these bits if the episode ends.
 TRUNCATED, TERMINATED = 1 << 6, 1 << 7
 
+# After the cells of a run: the first and last cell that the episode has changed.
+EXTRA_CELLS = 2
 _OCCUPIED = 16
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_ants import runtime
-from taichi_ants.engines.arguments import last_line
+from taichi_ants.engines.launch import last_line
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates
 from taichi_ants.task.constants import N_ACTIONS, ROW

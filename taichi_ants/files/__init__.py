@@ -10,7 +10,6 @@ import codecs
 import csv
 import errno
 import hashlib
-import io
 import json
 import math
 import os
@@ -19,7 +18,6 @@ import shutil
 import stat
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -36,9 +34,6 @@ else:
     import tomli as tomllib  # noqa: F401
 
 PathLike = str | os.PathLike[str]
-_ABANDONED = 3600.0  # age in seconds at which an unfinished file must be from a killed process
-_LISTED_FOR = 60.0  # seconds, because listing a folder of many files takes long
-_listed: dict[Path, tuple[float, list[Path]]] = {}
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> None:
@@ -59,40 +54,15 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> No
 def unfinished(target: Path) -> Iterator[Path]:
     """Yield a free path in the target's folder; the caller moves a complete file to the target.
 
-    A file or folder that is still at this path is removed at the end. If the process is killed, a
-    later write to the same target removes it, at least an hour later.
+    A file or folder that is still at this path is removed at the end. Its name begins with a dot.
     """
-    # A hash, because the name itself can already have the greatest length allowed.
-    name = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
-    for leftover in _left_in(target.parent):
-        with suppress(OSError):
-            if (
-                leftover.name.startswith(f".{name}.")
-                and time.time() - leftover.stat().st_mtime > _ABANDONED
-            ):
-                _remove(leftover)
-    temporary = target.parent / f".{name}.{secrets.token_hex(8)}.tmp"
+    temporary = target.parent / f".{secrets.token_hex(8)}.tmp"
     try:
         yield temporary
     finally:
+        shutil.rmtree(temporary, ignore_errors=True)  # only removes folders
         with suppress(OSError):
-            _remove(temporary)
-
-
-def _left_in(folder: Path) -> list[Path]:
-    """Return the unfinished files that a folder had at most a minute ago."""
-    when, names = _listed.get(folder, (0.0, []))
-    if not when or time.monotonic() - when > _LISTED_FOR:
-        names = list(folder.glob(".*.tmp"))
-        _listed[folder] = time.monotonic(), names
-    return names
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink()
+            temporary.unlink()
 
 
 def check_writable_file(path: PathLike) -> Path:
@@ -190,25 +160,13 @@ def read_text(path: PathLike, most: int = 1 << 26) -> str:
         raise AntsError(f"{named(path)} is not UTF-8 text; name another file.") from error
 
 
-def read_csv(path: PathLike) -> list[dict[str, Any]]:
-    """Return the rows of a file that `write_csv` wrote, with empty fields as None.
+def small(array: np.ndarray) -> np.ndarray:
+    """Return integers as the smallest signed type that holds them.
 
-    Numbers are floats, except that whole ones above 2^53 are integers.
+    Signed, so that the type of joined blocks does not depend on how runs were cut into blocks.
     """
-    try:
-        header, *lines = csv.reader(io.StringIO(read_text(path, 1 << 30)))
-        rows = [zip(header, line, strict=True) for line in lines if line]
-        return [{name: _number_in(text) for name, text in row} for row in rows]
-    except (csv.Error, ValueError) as error:
-        if isinstance(error, AntsError):
-            raise
-        raise AntsError(f"{named(path)} is not a table (CSV); name another file.") from error
-
-
-def smallest(array: np.ndarray) -> np.ndarray:
-    """Return integers as an array of the smallest integer type that can hold them."""
     low, high = int(array.min(initial=0)), int(array.max(initial=0))
-    return array.astype(np.promote_types(np.min_scalar_type(low), np.min_scalar_type(high)))
+    return array.astype(np.min_scalar_type(min(low, -1 - high)))
 
 
 def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Path:
@@ -264,12 +222,3 @@ def named(path: PathLike) -> str:
 def _reason(error: Exception) -> str:
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return text[:1].lower() + text[1:]
-
-
-def _number_in(text: str) -> float | str | None:
-    try:
-        number = float(text)
-    except ValueError:
-        return text or None
-    # Such whole numbers, for example seeds, can differ although they are equal as floats.
-    return int(text) if abs(number) > 1 << 53 and text.lstrip("-").isdigit() else number

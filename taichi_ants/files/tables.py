@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,6 @@ from taichi_ants.errors import imported
 Table = dict[str, np.ndarray]  # columns by name, all of one length
 
 
-def check_parquet() -> None:
-    """Raise AntsError if pyarrow, which writes Parquet, is not installed."""
-    imported("Parquet", "pyarrow", "parquet")
-
-
 def table_of(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Return the table of rows, whose columns are in order of appearance; missing ones are None."""
     names = dict.fromkeys(name for row in rows for name in row)
@@ -29,51 +24,44 @@ def table_of(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 def column(values: Sequence[Any]) -> np.ndarray:
     """Return a column of numbers or flags as an array of their type, others as Python objects."""
-    if len({*map(type, values)} - {float}) == 0 or {*map(type, values)} in ({int}, {bool}):
-        found = np.array(values)
-        if found.dtype.kind != "O":  # that of whole numbers beyond 64 bits
-            return found
-    found = np.empty(len(values), object)
-    found[:] = values
-    return found
+    if {*map(type, values)} in (set(), {float}, {int}, {bool}):
+        numbers = np.array(values)
+        if numbers.dtype.kind != "O":  # that of whole numbers beyond 64 bits
+            return numbers
+    objects = np.empty(len(values), object)
+    objects[:] = values
+    return objects
 
 
 def write(path: Path, table: Table, parquet: bool = False) -> None:
-    """Write a table to `path`.csv and, with `parquet`, to `path`.parquet."""
+    """Write a table to `path`.csv and, with `parquet`, to `path`.parquet.
+
+    None and nan are empty fields, and null in Parquet, in which mixed columns are floats if they
+    have numbers only, else text.
+    """
     text = io.StringIO()
+    columns = {  # floats are written exactly
+        name: [None if value != value else value for value in values.tolist()]
+        for name, values in table.items()
+    }
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(table)
-    rows.writerows(zip(*map(_plain, table.values()), strict=True))
+    rows.writerow(columns)
+    rows.writerows(zip(*columns.values(), strict=True))
     files.write_text(path.with_suffix(".csv"), text.getvalue())
     if parquet:
-        _write_parquet(path.with_suffix(".parquet"), table)
+        pyarrow = imported("Parquet", "pyarrow", "parquet")
+        arrays = {
+            name: pyarrow.array(*_typed(values, table[name])) for name, values in columns.items()
+        }
+        whole, to_file = pyarrow.table(arrays), imported("", "pyarrow.parquet", "").write_table
+        files.write_atomically(path.with_suffix(".parquet"), lambda file: to_file(whole, file))
 
 
-def _plain(values: np.ndarray) -> Iterator[Any]:
-    """Return values as the CSV file has them: floats exactly, None and nan as empty fields."""
-    return (None if one != one else one for one in values.tolist())
-
-
-def _write_parquet(path: Path, table: Table) -> None:
-    """Write a table with the types of its columns; None and nan are null.
-
-    Mixed columns are floats if they have numbers only, else text.
-    """
-    check_parquet()
-    import pyarrow
-    from pyarrow import parquet
-
-    columns = {name: pyarrow.array(*_typed(one)) for name, one in table.items()}
-    whole = pyarrow.table(columns)
-    files.write_atomically(path, lambda file: parquet.write_table(whole, file))
-
-
-def _typed(values: np.ndarray) -> tuple[list[Any], str]:
+def _typed(values: list[Any], column: np.ndarray) -> tuple[list[Any], str]:
     """Return values as Parquet has them, and the name of their type."""
-    kinds = {type(one) for one in values.tolist()} - {type(None)}
-    plain = list(_plain(values))
+    kinds = {type(value) for value in column.tolist()} - {type(None)}
     if kinds == {bool}:
-        return plain, "bool_"
-    if kinds and kinds <= {int, float} and all(one is None or abs(one) < 2**63 for one in plain):
-        return plain, "double" if float in kinds else "int64"
-    return [None if one is None else str(one) for one in plain], "string"
+        return values, "bool_"
+    if kinds and kinds <= {int, float} and all(v is None or abs(v) < 2**63 for v in values):
+        return values, "double" if float in kinds else "int64"
+    return [None if value is None else str(value) for value in values], "string"

@@ -27,7 +27,7 @@ from taichi_ants.viewer import Recorder
 
 # Sessions within these limits fit into `most`, so reading a file takes little time and memory.
 _WRITER = "Session.save, or Save session on its page,"
-KIND = Kind("session", 4, _WRITER, most=5_000_000, most_lists=100_000)
+KIND = Kind("session", 4, _WRITER, most=5_000_000)
 _REPLAY_SLICE = 0.02  # seconds of a piece of a replay
 _SNAPSHOT_INTERVAL = 0.1  # seconds of simulation between snapshots, the longest replay of an undo
 _MOST_KEPT = 1 << 28  # bytes of all snapshots

@@ -10,7 +10,7 @@ import numpy as np
 
 from taichi_ants.arguments import checked_seeds, checked_share
 from taichi_ants.errors import AntsError, as_array, checked_whole, expect
-from taichi_ants.files import PathLike, smallest
+from taichi_ants.files import PathLike, small
 from taichi_ants.files.archives import Kind
 from taichi_ants.records import Record
 from taichi_ants.task import Task
@@ -124,16 +124,11 @@ class Dataset(Record):
         ages = np.arange(len(self)) - self.begins[self.episode]
         return np.bincount(self.episode, weights=discount**ages * self.reward)
 
-    def first(self, transitions: int | None = None, episodes: int | None = None) -> Dataset:
-        """Return the first transitions or episodes of each run; a cut episode is truncated."""
-        keep = np.ones(len(self), bool)
+    def first(self, transitions: int) -> Dataset:
+        """Return the first transitions of each run; a cut episode is truncated."""
         # The first row of each row's run.
         first = np.searchsorted(self.run, np.arange(len(self.seeds)))[self.run]
-        if transitions is not None:
-            keep &= np.arange(len(self)) - first < checked_whole("transitions", transitions)
-        if episodes is not None:
-            keep &= self.episode - self.episode[first] < checked_whole("episodes", episodes)
-        return self._take(keep)
+        return self._take(np.arange(len(self)) - first < checked_whole("transitions", transitions))
 
     def of_run(self, run: int) -> Dataset:
         """Return the data of one seed, which keeps its number; AntsError if it has no data."""
@@ -152,7 +147,7 @@ class Dataset(Record):
     def save(self, path: PathLike) -> None:
         """Write a .npz file; raises as `archives.write` does."""
         arrays = {name: getattr(self, name) for name in COLUMNS}
-        arrays = {n: smallest(a) if a.dtype.kind == "i" else a for n, a in arrays.items()}
+        arrays = {n: small(a) if a.dtype.kind == "i" else a for n, a in arrays.items()}
         _KIND.write(path, self.facts(), arrays)
 
     @classmethod

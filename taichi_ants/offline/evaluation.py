@@ -55,7 +55,6 @@ def importance_sampling(
     weighted: Flag = True,
     resamples: Resamples = 200,
     level: Share = 0.95,
-    threads: int | None = None,
 ) -> PolicyValues:
     """Return values by per-decision importance sampling (Precup, Sutton and Singh, ICML 2000).
 
@@ -74,7 +73,6 @@ def importance_sampling(
         resamples: The number of bootstrap resamples of episodes; 0 gives no intervals. Intervals
             are too short for ants of one colony, because they are not independent.
         level: The confidence level of the intervals.
-        threads: CPU threads; None keeps the running number, or starts one for each CPU.
 
     Raises:
         AntsError: An argument is not allowed, or the data have no behaviour probabilities.
@@ -85,7 +83,7 @@ def importance_sampling(
             "behaviour_probability of the data contains nan; record data with record or "
             "record_colony, or use model_based."
         )
-    runtime.start(threads)
+    runtime.start()
     from taichi_ants.offline.kernels import add_up, weigh  # imports Taichi
 
     times, begins = _times(data, resamples), data.begins.astype(np.int32)
@@ -114,7 +112,6 @@ def model_based(
     initial_q: InitialValue = 0.0,
     resamples: Resamples = 200,
     level: Share = 0.95,
-    threads: int | None = None,
 ) -> PolicyValues:
     """Return the values of target policies in the empirical model of the data.
 
@@ -129,7 +126,7 @@ def model_based(
     starts = times / times.sum(axis=1, keepdims=True, dtype=np.int64)  # shares of episodes
 
     def estimated(policy: np.ndarray) -> tuple[np.ndarray, float]:
-        q = model.solve(discount, model.rewards, initial_q, policy, threads=threads)
+        q = model.solve(discount, model.rewards, initial_q, policy)
         values = (policy[first] * q[:, first]).sum(axis=-1)
         return (starts * values).sum(axis=1), np.nan
 

@@ -35,7 +35,6 @@ def batch_q_learning(
     sweeps: Count = 100,
     initial_q: InitialValue = 0.0,
     by_run: Flag = False,
-    threads: int | None = None,
 ) -> np.ndarray:
     """Return action values learned by Q-learning in repeated sweeps over the data, in their order.
 
@@ -50,7 +49,7 @@ def batch_q_learning(
     runs = np.arange(len(data.seeds) + 1) if by_run else [0, len(data.seeds)]
     groups, rates = np.searchsorted(data.run, runs).astype(np.int32), (learning_rate, discount)
     q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), initial_q, np.float32)
-    runtime.start(threads)
+    runtime.start()
     from taichi_ants.offline.kernels import replay  # imports Taichi
 
     rows = (data.state, data.action, data.reward, data.next_state, data.terminated.view(np.uint8))
@@ -66,7 +65,6 @@ def fitted_q_iteration(
     discount: Discount = 0.9,
     initial_q: InitialValue = 0.0,
     by_run: Flag = False,
-    threads: int | None = None,
 ) -> np.ndarray:
     """Return the optimal action values of the empirical model of the data, see `EmpiricalModel`.
 
@@ -76,7 +74,7 @@ def fitted_q_iteration(
     Arguments and errors are those of `batch_q_learning`; the discount must be at most 0.9999.
     """
     model = _model(data, by_run)
-    q = model.solve(discount, model.rewards, initial_q, threads=threads)
+    q = model.solve(discount, model.rewards, initial_q)
     return (q if by_run else q[0]).astype(np.float32)
 
 
@@ -86,7 +84,6 @@ def pessimistic_q_iteration(
     discount: Discount = 0.9,
     penalty: Annotated[float, Setting(least=0, most=1e9)] = 1.0,
     by_run: Flag = False,
-    threads: int | None = None,
 ) -> np.ndarray:
     """Return pessimistic action values, which are lower the fewer data a pair has.
 
@@ -103,7 +100,7 @@ def pessimistic_q_iteration(
     worst = data.task.rewards.by_event()[Event.ENTERED_EMPTY :].min()
     lowest = worst / (1.0 - discount)
     rewards = model.rewards - penalty / np.sqrt(model.counts)
-    q = model.solve(discount, rewards, lowest, lowest=lowest, threads=threads)
+    q = model.solve(discount, rewards, lowest, lowest=lowest)
     return (q if by_run else q[0]).astype(np.float32)
 
 
@@ -173,7 +170,6 @@ class EmpiricalModel:
         initial_q: float,
         policy: np.ndarray | None = None,
         lowest: float = -np.inf,
-        threads: int | None = None,
     ) -> np.ndarray:
         """Return converged action values, float64 (groups, n_states, 5).
 
@@ -185,7 +181,7 @@ class EmpiricalModel:
         q = np.full((n_groups, self.n_states, N_ACTIONS), initial_q, np.float64)
         values = np.empty((n_groups, self.n_states))
         greedy = np.zeros((self.n_states, N_ACTIONS)) if policy is None else policy
-        runtime.start(threads)
+        runtime.start()
         from taichi_ants.offline.kernels import iterate  # imports Taichi
 
         tables = q.reshape(-1), values.reshape(-1), np.ascontiguousarray(greedy).reshape(-1)

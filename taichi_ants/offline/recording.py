@@ -10,8 +10,6 @@ import numpy as np
 from taichi_ants import arguments, runtime
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.engine import Progress, Runs
-from taichi_ants.engines.runs.results import RunState
-from taichi_ants.engines.runs.traces import record_steps
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.features import CASTES, CHOICE, COLONY, FOODS, refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
@@ -69,8 +67,7 @@ def record(
     facts: dict[str, Any]
     if isinstance(behaviour, TrainingConfig):
         configs = arguments.checked_configs(behaviour, task)
-        state = RunState.initial(configs, numbers, task.n_states).part([0])
-        runs = Runs.learning(configs, numbers, state)
+        runs = Runs.learning(world, task, max_steps, configs, numbers)
         facts = {"policy": "learner", **configs[0].as_dict()}
     else:
         facts = {"policy": "random" if behaviour is None else "table", "epsilon": epsilon}
@@ -84,11 +81,11 @@ def record(
                 f"of the {len(numbers)} seeds."
             )
         tables = np.broadcast_to(tables, (len(numbers), *tables.shape[-2:]))
-        words = np.array(numbers, dtype=object)
-        runs = Runs.following(tables, words, np.arange(episodes), epsilon)
+        which = tables, numbers, range(episodes), epsilon
+        runs = Runs.following(world, task, max_steps, *which)
     pieces = [
         {**{n: steps[there] for n, there in _FROM_TRACE.items()}, "agent": 0 * steps["runs"]}
-        for steps in record_steps(world, task, max_steps, runs, episodes, progress)
+        for steps in runs.record(episodes, progress)
     ]
     return _dataset(pieces, world=world, task=task, seeds=numbers, behaviour=facts)
 

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.runs.traces import RolloutArguments, Trace, rollout
+from taichi_ants.engines.runs.results import RolloutArguments, Trace
+from taichi_ants.engines.runs.training import rollout
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
@@ -74,8 +75,7 @@ class Episode:
     @classmethod
     def play(cls, world: World, q_values: np.ndarray, **rules: Any) -> Episode:
         """Return rollout 0 of a policy; `rules` and errors are those of `rollout`."""
-        epsilon = rules.get("epsilon", 0.0)
-        name = f"epsilon {epsilon:g}" if epsilon else "greedy"
+        name = f"epsilon {rules['epsilon']:g}" if rules.get("epsilon") else "greedy"
         return cls(rollout(world, q_values, **rules), name)
 
     @property

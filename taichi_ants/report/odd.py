@@ -206,7 +206,6 @@ class Model:
 def odd_of(folder: Path, manifest: Mapping[str, Any]) -> str:
     """Return the ODD description of finished results, as Markdown."""
     asked = asked_in(folder)
-    assert asked is not None  # because the results are finished
     inputs = asked["inputs"]
     name = inputs.get(str(asked["options"].get("file")))
     sweep = files.tomllib.loads(files.read_text(folder / name)) if name else {}

@@ -17,7 +17,7 @@ from __future__ import annotations
 import ast
 import inspect
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import reduce
 from textwrap import dedent
 from typing import Any, NoReturn
@@ -30,6 +30,9 @@ _OPERATORS |= {ast.Div: "{} / {}", ast.FloorDiv: "ti.floor({} / {})", ast.Mod: "
 _OPERATORS |= {ast.USub: "-{}", ast.UAdd: "{}"}
 _COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "=="}
 _COMPARISONS |= {ast.NotEq: "!="}
+_CONDITION = "is not a number; use it as a condition, as in `1 if a and b else 0`"
+_INSTEAD: dict[type, str] = dict.fromkeys((ast.And, ast.Or, ast.Not), _CONDITION)
+_INSTEAD[ast.Pow] = "is not allowed; write power(x, y), of taichi_ants.rules"
 
 
 class LanguageError(ValueError):
@@ -63,23 +66,17 @@ class _Translation:
         self._tree, self._arguments, self._lengths = tree, lengths, dict(lengths)
         self._first_line = tree.lineno - len(tree.decorator_list)
         self._loops: list[tuple[str, int]] = []  # variables and repetitions of the present loops
-        assigned = (
-            node.id
-            for node in ast.walk(tree)
-            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-        )
-        self._vectors = {
-            ast.unparse(node.targets[0])
-            for node in ast.walk(tree)
-            if isinstance(node, ast.Assign) and isinstance(node.value, (ast.List, ast.ListComp))
-        }
+        assigned = []
+        self._vectors, self._loop_variables = set[str](), set[str]()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                assigned.append(node.id)
+            elif isinstance(node, ast.Assign) and isinstance(node.value, (ast.List, ast.ListComp)):
+                self._vectors.add(ast.unparse(node.targets[0]))
+            elif isinstance(node, (ast.For, ast.comprehension)):
+                self._loop_variables.add(ast.unparse(node.target))
         numbers = [*(n for n in lengths if not lengths[n]), *assigned]
         self._numbers = dict.fromkeys(n for n in numbers if n not in self._vectors)
-        self._loop_variables = {
-            node.target.id
-            for node in ast.walk(tree)
-            if isinstance(node, (ast.For, ast.comprehension)) and isinstance(node.target, ast.Name)
-        }
 
     def source(self) -> str:
         """Return the source of the function."""
@@ -87,11 +84,9 @@ class _Translation:
         if ast.get_docstring(self._tree) is not None:
             body = body[1:]
         returns = [node for node in ast.walk(self._tree) if isinstance(node, ast.Return)]
-        if not body or returns != body[-1:]:
-            raise LanguageError("its last line, and no other, must be a return")
-        if returns[0].value is None:
-            raise LanguageError("its return has no value")
-        inner = [line for statement in body[:-1] for line in self._statement(statement, "    ")]
+        if not body or returns != body[-1:] or returns[0].value is None:
+            raise LanguageError("its last line, and no other, must be a return with a value")
+        inner = [*self._block(body[:-1], "    ")]
         inner += [f"    return ti.cast({self._number(returns[0].value)}, ti.f64)", ""]
         lines = [f"def rule({', '.join(f'a_{name}' for name in self._arguments)}):"]
         lines += [f"    u_{name} = ti.cast(a_{name}, ti.f64)" for name in self._arguments]
@@ -108,6 +103,10 @@ class _Translation:
         text = text if len(text) <= 60 else text[:57] + "..."
         raise LanguageError(f"line {line} of it, `{text}`, {why}")
 
+    def _block(self, statements: Iterable[ast.stmt], indent: str) -> Iterator[str]:
+        for statement in statements:
+            yield from self._statement(statement, indent)
+
     def _statement(self, node: ast.stmt, indent: str) -> Iterator[str]:
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             yield f"{indent}{self._target(node.targets[0])} = {self._assigned(node)}"
@@ -117,16 +116,13 @@ class _Translation:
             yield f"{indent}{self._target(node.target)} = {self._cast(whole)}"
         elif isinstance(node, ast.If):
             yield f"{indent}if {self._truth(node.test)}:"
-            for statement in node.body:
-                yield from self._statement(statement, indent + "    ")
+            yield from self._block(node.body, indent + "    ")
             if node.orelse:
                 yield f"{indent}else:"
-                for statement in node.orelse:
-                    yield from self._statement(statement, indent + "    ")
+                yield from self._block(node.orelse, indent + "    ")
         elif isinstance(node, ast.For) and not node.orelse:
             yield f"{indent}{self._enter(node.iter, node.target)}:"
-            for statement in node.body:
-                yield from self._statement(statement, indent + "    ")
+            yield from self._block(node.body, indent + "    ")
             self._loops.pop()
         elif isinstance(node, ast.Pass):
             yield f"{indent}pass"
@@ -202,7 +198,8 @@ class _Translation:
             return self._literal(node, value)
         if isinstance(node, ast.Subscript):
             return self._entry(node)
-        form = _OPERATORS.get(type(getattr(node, "op", None)), "")
+        operator = type(getattr(node, "op", None))
+        form = _OPERATORS.get(operator, "")
         if isinstance(node, ast.BinOp) and form:
             return f"({form.format(self._number(node.left), self._number(node.right))})"
         if isinstance(node, ast.UnaryOp) and form:
@@ -214,13 +211,7 @@ class _Translation:
             return f"ti.select({self._truth(node.test)}, {branches})"
         if isinstance(node, ast.Call):
             return self._call(node)
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
-            self._refuse(node, "is not allowed; write power(x, y), of taichi_ants.rules")
-        if isinstance(node, ast.BoolOp) or isinstance(getattr(node, "op", None), ast.Not):
-            self._refuse(
-                node, "is not a number; use it as a condition, as in `1 if a and b else 0`"
-            )
-        self._refuse(node)
+        self._refuse(node, _INSTEAD.get(operator, "is not allowed"))
 
     def _literal(self, node: ast.expr, value: Any) -> str:
         if not isinstance(value, (bool, int, float)):

@@ -17,7 +17,7 @@ get = RULES.get
 
 
 def register(
-    kind: str, *, name: str | None = None, summary: str = ""
+    kind: str, *, name: str | None = None
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Return a decorator that registers a function as a rule and returns the function.
 
@@ -26,7 +26,6 @@ def register(
     Args:
         kind: "choice", "deposit", "evaporation" or "reward".
         name: The name of the rule, by default that of the function.
-        summary: A short description.
 
     Raises:
         AntsError: A name is taken or not known, the function contains something that kernels cannot
@@ -51,7 +50,7 @@ def register(
             argument: inputs[argument].length if argument in inputs else 0
             for argument in inspect.signature(function).parameters
         }
-        rule = Rule(called, kind, function, inputs, settings, "", summary)
+        rule = Rule(called, kind, function, inputs, settings, "")
         try:
             rule = replace(rule, source=kernel_source(function, lengths))
         except LanguageError as error:

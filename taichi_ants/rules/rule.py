@@ -50,7 +50,6 @@ class Rule:
         inputs: The inputs by name, in the order of the arguments.
         settings: The class of the parameters.
         source: The source of the function for kernels.
-        summary: A line for listings.
     """
 
     name: str
@@ -59,7 +58,6 @@ class Rule:
     inputs: Mapping[str, Input]
     settings: type[Parameters]
     source: str
-    summary: str = ""
 
     @property
     def parameters(self) -> tuple[str, ...]:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
 
 EXIT_BAD_INPUT = 2
-MOST_SHARDS = 100_000
 # Help for options that several commands have.
 PLUGIN = "Python file that registers learners, observations, worlds, measures or rules"
 THREADS = "number of CPU threads (default: all)"
@@ -77,8 +76,7 @@ class Parser(argparse.ArgumentParser):
         words = sys.argv[1:] if args is None else list(args)
         for before, word in zip(["", *words], words, strict=False):
             if word == "" or (word.startswith("--") and word.endswith("=")):
-                after = f"the argument after {before!r}" if before else "the first argument"
-                name = word[:-1] or (before if before.startswith("--") else after)
+                name = word[:-1] or f"the argument after {before!r}"
                 self.error(f"{name} is empty; give a value or leave it out")
             self._add_setting(word.partition("=")[0])
         return super().parse_known_args(words, namespace)
@@ -126,57 +124,32 @@ def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) 
 
 
 def add_machines(parser: argparse.ArgumentParser) -> None:
-    """Add the options of commands that can spread their work, see `machines.chosen`."""
-    add = parser.add_argument
+    """Add the options of commands that can spread their work, see `command.executor_of`."""
+    add = parser.add_mutually_exclusive_group().add_argument
     workers = "number of worker processes on this machine (default: all work in this process)"
     add("--workers", type=whole_number(1, 1024), metavar="N", help=workers)
     ray = (
         "spread the work with Ray over this machine, or over the cluster at HOST:PORT that this "
         "machine belongs to"
     )
-    add("--ray", nargs="?", const=True, type=_address, metavar="HOST:PORT", help=ray)
+    add("--ray", nargs="?", const=True, metavar="HOST:PORT", help=ray)
     shard = (
         "compute only the I-th of N equal parts, for example of a job array; the last part to "
         "finish in a folder writes the tables"
     )
-    add("--shard", type=_shard, metavar="I/N", help=shard)
-
-
-def _address(text: str) -> str:
-    """Return the address of a Ray cluster."""
-    host, _, port = text.rpartition(":")
-    if not (host and "/" not in host and port.isdecimal() and 0 < int(port) < 2**16):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not the address of a Ray cluster; write HOST:PORT, for example "
-            "10.0.0.1:6379, or leave it out and give --ray as the last option"
-        )
-    return text
+    parser.add_argument("--shard", type=_shard, metavar="I/N", help=shard)
 
 
 def _shard(text: str) -> tuple[int, int]:
     """Return the numbers of a shard such as 2/3."""
-    number, slash, shards = text.partition("/")
-    if not (slash and number.isdecimal() and shards.isdecimal()):
+    number, _, shards = text.partition("/")
+    if not (number.isdecimal() and shards.isdecimal() and 1 <= int(number) <= int(shards)):
         raise argparse.ArgumentTypeError(f"{text!r} is not a shard; write I/N, for example 2/3")
-    if not 1 <= int(number) <= int(shards) <= MOST_SHARDS:
-        raise argparse.ArgumentTypeError(
-            f"there is no shard {text}; write I/N with I from 1 to N, and N at most {MOST_SHARDS}"
-        )
     return int(number), int(shards)
 
 
 def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
-    """Return the settings with a folder for the results, which --quick changes.
-
-    Raises:
-        AntsError: Options of `add_machines` exclude each other.
-    """
-    for other in ("workers", "shard"):
-        if getattr(settings, "ray", None) and getattr(settings, other, None):
-            raise AntsError(
-                f"--ray and --{other} cannot be combined, because Ray already spreads all of the "
-                "work; leave one of them out."
-            )
+    """Return the settings with a folder for the results, which --quick changes."""
     name = f"{name}-quick" if getattr(settings, "quick", False) else name
     settings.out = settings.out or Path("results", name)
     return settings
@@ -200,26 +173,28 @@ def add_settings(parser: Parser, base: Settings) -> None:
     """Add an option for each setting except `parser.own_settings`; `base` has the defaults."""
     parser.usage = "%(prog)s [options]"  # without the list of options, which is too long
     group = parser.add_argument_group(f"{base.path} settings")
-    for one in declared(type(base)):
-        value = getattr(base, one.name)
-        if one.kind is Named:
-            parser.named_groups += (one.path,)
-            group.description = f"{group.description or ''}{_help_of_entries(one)}"
-        elif one.path not in parser.own_settings and (one.has_names or not one.is_group):
+    for setting in declared(type(base)):
+        value = getattr(base, setting.name)
+        if setting.kind is Named:
+            parser.named_groups += (setting.path,)
+            group.description = f"{group.description or ''}{_help_of_entries(setting)}"
+        elif setting.path not in parser.own_settings and (
+            setting.has_names or not setting.is_group
+        ):
             # The value is checked where it is used.
-            how: dict[str, Any] = {"metavar": {int: "N", float: "X"}.get(one.kind, "NAME")}
-            if one.kind is bool:
+            how: dict[str, Any] = {"metavar": {int: "N", float: "X"}.get(setting.kind, "NAME")}
+            if setting.kind is bool:
                 how = {"nargs": "?", "const": True, "metavar": "true|false"}
-            how |= {"dest": one.path, "type": _literal, "default": argparse.SUPPRESS}
-            about = one.about(value).replace("%", "%%")
-            group.add_argument(f"--{one.path.replace('_', '-')}", **how, help=about)
-        if one.is_group:
+            how |= {"dest": setting.path, "type": _literal, "default": argparse.SUPPRESS}
+            about = setting.about(value).replace("%", "%%")
+            group.add_argument(f"--{setting.path.replace('_', '-')}", **how, help=about)
+        if setting.is_group:
             add_settings(parser, value)
 
 
 def _help_of_entries(group: DeclaredSetting) -> str:
     """Return the help of options such as --task.fields.home.level, for any name."""
-    names = ", ".join(one.name.replace("_", "-") for one in declared(group.entry))
+    names = ", ".join(setting.name.replace("_", "-") for setting in declared(group.entry))
     option = f"--{group.path.replace('_', '-')}.NAME.SETTING"
     settings = f"SETTING is one of {names}" if names else "each rule declares its own"
     return f"{option}: {group.rule.help}; {settings}. "
@@ -248,15 +223,16 @@ def given_world(settings: argparse.Namespace) -> World:
     return worlds.build(settings.world, **given)
 
 
-def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:
-    """Run a command, report an error or interruption in one sentence, and exit Python."""
+@contextmanager
+def reporting(interrupted: str = "Stopped.") -> Iterator[None]:
+    """Return a context that reports an error or interruption in one sentence, and exits Python."""
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
     os.environ["MPLBACKEND"] = "agg"  # figures are files, and the user's backend may be missing
     status = 0
     try:
         with stoppable(interrupted):
-            command()
+            yield
         if sys.stdout is not None:  # it is None if the caller has closed it
             sys.stdout.flush()
     except BrokenPipeError:  # nobody reads the output any more, for example after `| head`
@@ -269,26 +245,29 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
     sys.exit(status)
 
 
+def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> None:
+    """Run a command `reporting` its errors, and exit Python."""
+    with reporting(interrupted):
+        command()
+
+
 @contextmanager
-def progress_bar(title: str, executor: Any = None) -> Iterator[Callable[[float], None]]:
+def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
     """Yield a function that shows the finished share of the work, 0 to 1, as a progress bar.
 
-    The bar is on standard error, if that is a terminal. It ends with the text of `executor`, if
-    that has workers which come and go. The function raises KeyboardInterrupt if a library has
-    ignored a signal to stop.
+    The bar is on standard error, if that is a terminal. The function raises KeyboardInterrupt if a
+    library has ignored a signal to stop.
     """
     from rich.console import Console
-    from rich.progress import Progress, TextColumn
+    from rich.progress import Progress
 
-    console, state = Console(stderr=True), getattr(executor, "state", lambda: "")
-    columns = *Progress.get_default_columns(), TextColumn("{task.fields[state]}")
-    how: Any = {"console": console, "transient": True, "disable": not console.is_terminal}
-    with Progress(*columns, **how) as bar:
-        task = bar.add_task(title, total=1.0, state=state())
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(title, total=1.0)
 
         def update(share: float) -> None:
             stop_if_noted()
-            bar.update(task, completed=share, state=state())
+            bar.update(task, completed=share)
 
         stop_if_noted()
         yield update

@@ -48,15 +48,21 @@ class Range(NamedTuple):
         for key in table:
             check_one_of(f"a key of the range {name}", key, _OF_RANGE)
         whole = checked_flag(f"{name}.whole", table.get("whole", whole))
-        low, high = (_end(f"{name}.{key}", table.get(key), whole) for key in ("from", "to"))
         check_one_of(f"{name}.scale", table.get("scale", "linear"), ("linear", "log"))
         log, steps = table.get("scale") == "log", table.get("steps")
         if steps is not None:
             checked_whole(f"{name}.steps", steps, 2, _MOST)
-        if not low < high or (log and low <= 0):
-            above = ", and above 0 with the scale log" * log
-            raise AntsError(f"{name}.from is {shown(low)}; it must be below {shown(high)}{above}.")
-        return cls(low, high, log, whole, steps)
+        kinds = (int,) if whole else (int, float)
+        ends: Any = table.get("from"), table.get("to")
+        low, high = ends
+        are_numbers = all(type(end) in kinds and -(2**53) <= end <= 2**53 for end in ends)
+        if not (are_numbers and low < high and (low > 0 or not log)):
+            kind, above = "whole number" if whole else "number", ", above 0 for the scale log" * log
+            raise AntsError(
+                f"{name} is from {shown(low)} to {shown(high)}; both must be a {kind}, and the "
+                f"first the smaller one{above}."
+            )
+        return cls(low if whole else float(low), high if whole else float(high), log, whole, steps)
 
     def at(self, share: float) -> float | int:
         """Return the value at a share of the range, 0 to 1; whole numbers have equal parts."""
@@ -127,18 +133,16 @@ class Design:
     @classmethod
     def of(cls, file: Mapping[str, Any]) -> Design:
         """Return the design of a sweep file; AntsError if a key is not allowed."""
-        kind, others = file.get("design", GRID), [key for key in KEYS[1:] if key in file]
+        kind = file.get("design", GRID)
         check_one_of("design", kind, DESIGNS)
         if kind == GRID:
-            if others:
-                raise AntsError(
-                    f'{others[0]} is {shown(file[others[0]])}, but the design is "grid"; leave it '
-                    f"out, or set design to one of {', '.join(DESIGNS[1:])}."
-                )
+            for key in KEYS[1:]:
+                if key in file:
+                    raise AntsError(
+                        f"{key} is for the designs {', '.join(DESIGNS[1:])}; set design."
+                    )
             return cls()
-        if "samples" not in file:
-            raise AntsError(f"samples is missing; the design {kind!r} needs a number of points.")
-        samples = checked_whole("samples", file["samples"], 1, _MOST)
+        samples = checked_whole("samples", file.get("samples"), 1, _MOST)
         seed = checked_whole("design_seed", file.get("design_seed", 0), 0, 2**63 - 1)
         sensitivity = checked_flag("sensitivity", file.get("sensitivity", False))
         if sensitivity:
@@ -203,12 +207,3 @@ class Design:
         # `random` warns unless the number is a power of 2, so the sequence is cut.
         whole = math.ceil(math.log2(self.samples))
         return qmc.Sobol(dimensions, seed=self.seed).random_base2(whole)[: self.samples]
-
-
-def _end(name: str, value: Any, whole: bool) -> float | int:
-    """Return an end of a range."""
-    if whole:
-        return checked_whole(name, value, -(2**53), 2**53)
-    if type(value) not in (int, float) or not math.isfinite(value):
-        raise AntsError(f"{name} is {shown(value)}; it must be a finite number.")
-    return float(value)

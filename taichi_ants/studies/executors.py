@@ -64,10 +64,18 @@ def completed(
         LostWorkersError: The executor takes no more work.
     """
     if executor is None:
-        yield from ((piece, _tried(work_of(piece))) for piece in pieces)
+        for piece in pieces:
+            outcome: Any
+            try:
+                outcome = work_of(piece)()
+            except Exception as error:
+                stop_if_noted()
+                outcome = error
+            yield piece, outcome
         return
     source, again, deaths = iter(pieces), deque[Piece](), Counter[Piece]()
     coming: dict[Future[Any], Piece] = {}
+    fault: Any
     try:
         while True:
             workers = getattr(executor, "num_workers", 0) or available_threads()
@@ -77,7 +85,15 @@ def completed(
                     following = again.popleft()
                 if following is None:
                     break
-                coming[_submitted(executor, work_of(following), code)] = following
+                work = pickle.dumps(work_of(following), -1)
+                try:
+                    future = executor.submit(do, versions(), tuple(code), work)
+                except (BrokenExecutor, RuntimeError) as refusal:
+                    why = f"{type(refusal).__name__}: {refusal}"
+                    raise LostWorkersError(
+                        f"the executor takes no more work ({why}); {RESUME}."
+                    ) from refusal
+                coming[future] = following
             if not coming:
                 return
             done, _ = concurrent.futures.wait(
@@ -86,47 +102,21 @@ def completed(
             stop_if_noted()
             getattr(executor, "check", lambda: None)()
             for future in done:
-                piece, fault = coming.pop(future), _error_of(future)
-                if not isinstance(fault, BrokenExecutor):
-                    yield piece, fault or future.result()
-                    continue
-                deaths[piece] += 1
-                if deaths[piece] < TRIES:
-                    again.append(piece)
-                else:
-                    yield piece, LostWorkersError(_DIED)
+                piece, fault = coming.pop(future), RuntimeError("cancelled")  # by somebody else
+                if not future.cancelled():
+                    fault = future.exception()
+                if fault and not isinstance(fault, Exception):  # a SystemExit, for example
+                    fault = RuntimeError(f"{type(fault).__name__}: {fault}")
+                if isinstance(fault, BrokenExecutor):
+                    deaths[piece] += 1
+                    if deaths[piece] < TRIES:
+                        again.append(piece)
+                        continue
+                    fault = LostWorkersError(_DIED)
+                yield piece, fault or future.result()
     finally:
         for future in coming:
             future.cancel()
-
-
-def _tried(work: Callable[[], Any]) -> Any:
-    """Return the outcome of some work, or its exception."""
-    try:
-        return work()
-    except Exception as error:
-        stop_if_noted()
-        return error
-
-
-def _submitted(executor: Any, work: Callable[..., Any], code: Sequence[Code]) -> Future[Any]:
-    try:
-        return executor.submit(do, versions(), tuple(code), pickle.dumps(work, -1))
-    except (BrokenExecutor, RuntimeError) as refusal:
-        raise LostWorkersError(
-            f"the executor takes no more work ({type(refusal).__name__}: {refusal}); {RESUME}."
-        ) from refusal
-
-
-def _error_of(future: Future[Any]) -> Exception | None:
-    """Return the error of a finished future, which somebody else may have cancelled."""
-    try:
-        error = future.exception()
-    except concurrent.futures.CancelledError as cancelled:
-        return RuntimeError(f"cancelled {cancelled}".strip())
-    if error is None or isinstance(error, Exception):
-        return error
-    return RuntimeError(f"{type(error).__name__}: {error}")  # a SystemExit, for example
 
 
 def versions() -> Versions:
@@ -174,8 +164,8 @@ class Workers(Executor):
     def submit(self, call: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
         """Return the future of a call in the worker that has the fewest calls."""
         for calls in self._calls:
-            calls -= {one for one in calls if one.done()}
-        n = min(range(self.num_workers), key=lambda one: len(self._calls[one]))
+            calls -= {future for future in calls if future.done()}
+        n = min(range(self.num_workers), key=lambda n: len(self._calls[n]))
         with _without_ctrl_c():
             for _ in range(TRIES):
                 with suppress(BrokenExecutor):

@@ -17,28 +17,27 @@ import os
 import socket
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from operator import methodcaller
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import PHYSICS, __version__, files
+from taichi_ants import files
 from taichi_ants.errors import AntsError, count, shown
 from taichi_ants.settings import flat
 from taichi_ants.studies.provenance import provenance
 from taichi_ants.studies.store import BLOCKS, Arrays, Store
-from taichi_ants.studies.study import FailedBlocksError, Study, share_of, varied
+from taichi_ants.studies.study import FailedBlocksError, Study, share_of
 
 STUDY, MANIFEST, REPORT, PAGE = "study.json", "manifest.json", "report.txt", "report.html"
 INPUTS, SESSIONS = "inputs", "sessions"
 _OF_ALL = (STUDY, INPUTS, BLOCKS, SESSIONS)
-_SHOWN = 3  # values of a setting, at most, in a message
 _BESIDE_SETTINGS = "physics", "version", "plugin", "arch"  # what else determines results
-_MANY = 20  # lost values of a setting, which a design has drawn
 
 
 @dataclass(frozen=True)
@@ -61,14 +60,10 @@ class Results:
     part: bool = False
     arch: str = "cpu"
 
-    def read(self, *arrays: str, points: Sequence[int] | None = None) -> Arrays:
-        """Return arrays with their parts, (points, seeds, ...), of some points or of all.
-
-        Missing runs are nan, or 0 in arrays that are not floats.
-        """
-        keys = self.study.keys
-        keys = keys if points is None else tuple(keys[p] for p in points)
-        return self.store.read(keys, self.study.seeds, arrays, self.part)
+    @property
+    def read(self) -> Callable[..., Arrays]:
+        """The method `read` of the store, for all seeds: it takes keys of points, and `arrays`."""
+        return partial(self.store.read, seeds=self.study.seeds, part=self.part)
 
     @property
     def present(self) -> np.ndarray:
@@ -76,34 +71,26 @@ class Results:
         return ~self.study.missing(self.store)
 
 
-def asked_of(study: Study, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a study asks for, as JSON; `facts` say how to plan it again."""
-    own = {
-        **{"version": __version__, "physics": PHYSICS, **facts},
-        **{"points": study.keys, "seeds": study.seeds, "arrays": study.arrays},
-        **{"seconds": study.seconds[:, 0], "families": study.families},
-        "varied": varied(study.points),
-    }
-    return json.loads(files.to_json(own))
+def asked_in(folder: Path) -> dict[str, Any]:
+    """Return what was asked for in a folder; AntsError if nothing was, or it is damaged."""
+    asked = json_in(folder / STUDY)
+    if asked is None:
+        raise AntsError(f"{files.named(folder)} has no results; name the folder of a study.")
+    return asked
 
 
-def asked_in(folder: Path) -> dict[str, Any] | None:
-    """Return what was asked for in a folder; None if nothing was, AntsError if it is damaged."""
-    return _json_in(folder / STUDY)
+def json_in(path: Path) -> dict[str, Any] | None:
+    """Return the facts in a file that `write_json` wrote; None if it is missing.
 
-
-def manifest_in(folder: Path) -> dict[str, Any] | None:
-    """Return the manifest of finished results; None without any, AntsError if it is damaged."""
-    return _json_in(folder / MANIFEST)
-
-
-def _json_in(path: Path) -> dict[str, Any] | None:
+    Raises:
+        AntsError: The file is damaged.
+    """
     if not path.exists():
         return None
     try:
-        found = json.loads(files.read_text(path))
-        if found.pop("checksum") == files.checksum_of_json(found):
-            return found
+        facts = json.loads(files.read_text(path))
+        if facts.pop("checksum") == files.checksum_of_json(facts):
+            return facts
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         pass
     raise AntsError(
@@ -121,18 +108,18 @@ def write_json(path: Path, facts: Mapping[str, Any]) -> None:
 def ask(folder: Path, asked: Mapping[str, Any], inputs: Mapping[str, bytes], force: bool) -> None:
     """Write down what a study asks for, and copies of the files that it has read.
 
-    `inputs` are their contents by their places in the folder. With `force`, the study can lack what
+    `inputs` are their contents by their paths in the folder. With `force`, the study can lack what
     the folder has.
 
     Raises:
         AntsError: The folder has other files, or points or seeds that the study lacks.
     """
-    before = asked_in(folder)
+    before = json_in(folder / STUDY)
     if before == asked:
         return
     if before and not force:
         _check_grows(folder, before, asked)
-    elif not force and folder.is_dir() and any(one.name not in _OF_ALL for one in folder.iterdir()):
+    elif not force and folder.is_dir() and any(p.name not in _OF_ALL for p in folder.glob("[!.]*")):
         raise AntsError(
             f"{files.named(folder)} contains files, but no results; choose another --out, or give "
             "--force to add results to them."
@@ -145,65 +132,35 @@ def ask(folder: Path, asked: Mapping[str, Any], inputs: Mapping[str, bytes], for
 
 
 def _check_grows(folder: Path, before: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
-    """Raise AntsError if a study lacks points or seeds that a folder has."""
-    points = [n for n, one in enumerate(before["points"]) if one not in {*asked["points"]}]
-    seeds = [one for one in before["seeds"] if one not in {*asked["seeds"]}]
-    if not points and not seeds:
+    """Raise AntsError, which names what differs, if a study lacks what a folder has."""
+    if all({*before[runs]} <= {*asked[runs]} for runs in ("points", "seeds")):
         return
-    which = f"that this study lacks ({_lost(before, asked, points, seeds)}); add them,"
-    if not {*before["points"]} & {*asked["points"]}:
-        which = f"of other settings ({_differences(before, asked)});"
-    raise AntsError(
-        f"{files.named(folder)} contains results {which} choose another --out, or give --force to "
-        "replace them."
-    )
-
-
-def _lost(
-    before: Mapping[str, Any], asked: Mapping[str, Any], points: Sequence[int], seeds: Sequence[int]
-) -> str:
-    """Return in words the seeds that a study lacks, and the values of settings that vary."""
-    lost = {"seed": [*map(files.to_json, seeds)]}
-    for name in before["varied"][0]:
-        here = {files.to_json(one.get(name)) for one in asked["varied"]}
-        texts = dict.fromkeys(files.to_json(before["varied"][n][name]) for n in points)
-        lost[name] = [text for text in texts if text not in here]
-    words = [
-        f"{name} {', '.join(texts[:_SHOWN])}{' ...' * (len(texts) > _SHOWN)}"
-        for name, texts in lost.items()
-        if texts and len(texts) < _MANY
-    ]
-    return ", ".join(words) or count(len(points), "point")
-
-
-def _differences(before: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
-    """Return in words how the settings of a folder differ from those of a study."""
     there, here = (
-        {**{name: one[name] for name in _BESIDE_SETTINGS}, **flat(one["settings"])}
-        for one in (before, asked)
+        {**{name: facts[name] for name in _BESIDE_SETTINGS}, **flat(facts["settings"])}
+        for facts in (before, asked)
     )
-    said, others = [], []
-    for name in dict.fromkeys([*there, *here]):
-        one, other = there.get(name), here.get(name)
-        if one != other and not {type(one), type(other)} & {list, dict}:
-            said.append(f"{name} is {shown(one)} instead of {shown(other)}")
-        elif one != other:
-            others.append(name)
-    return ", ".join([*said, *([f"not the same {', '.join(others)}"] if others else [])])
+    differ = [name for name in {**there, **here} if there.get(name) != here.get(name)]
+    words = (
+        f"{n} is {shown(there.get(n), 40)} instead of {shown(here.get(n), 40)}" for n in differ
+    )
+    raise AntsError(
+        f"{files.named(folder)} contains results that this study lacks ({', '.join(words)}); "
+        "choose another --out, or give --force to replace them."
+    )
 
 
 @contextmanager
 def session(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
     """Return a context in which a file says that this process computes, and then how it ended."""
-    places = files.check_writable_folder(folder / SESSIONS, folder)
+    sessions = files.check_writable_folder(folder / SESSIONS, folder)
     began, name = time.time(), f"{time.strftime('%Y%m%dT%H%M%S')}-{socket.gethostname()}"
     facts = {**provenance(sys.argv), "shard": shard, "began": began, "seconds": None, "failed": []}
-    path = places / f"{name}-{os.getpid()}.json"
+    path = sessions / f"{name}-{os.getpid()}.json"
     files.write_text(path, files.to_json(facts, indent=1))
     try:
         yield
     except FailedBlocksError as error:
-        facts["failed"] = error.several
+        facts["failed"] = error.blocks
         raise
     finally:
         facts["seconds"] = time.time() - began
@@ -213,16 +170,16 @@ def session(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
 
 def sessions_in(folder: Path) -> list[dict[str, Any]]:
     """Return the facts about all processes that have computed in a folder, oldest first."""
-    found = []
+    sessions = []
     for path in sorted((folder / SESSIONS).glob("*.json")):
         with suppress(ValueError):  # it is damaged; includes AntsError
-            found.append(json.loads(files.read_text(path)))
-    return sorted(found, key=lambda one: one["began"])
+            sessions.append(json.loads(files.read_text(path)))
+    return sorted(sessions, key=lambda facts: facts["began"])
 
 
 def is_finished(folder: Path, asked: Mapping[str, Any], figures: bool, parquet: bool) -> bool:
     """Return whether a folder has all tables that were asked for, and they are unchanged."""
-    manifest = manifest_in(folder)
+    manifest = json_in(folder / MANIFEST)
     return bool(
         manifest
         and manifest.get("study") == files.checksum_of_json(asked)
@@ -243,7 +200,7 @@ def publish(folder: Path, ready: Path, made: Mapping[str, Any] | None) -> None:
     paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
     checksums = {path.as_posix(): checksum_of(ready / path) for path in paths}
     with suppress(AntsError):  # a damaged manifest is replaced
-        for name in (manifest_in(folder) or {"files": ()})["files"]:
+        for name in (json_in(folder / MANIFEST) or {"files": ()})["files"]:
             file = folder / name
             if name not in checksums and file.resolve().is_relative_to(folder.resolve()):
                 file.unlink(missing_ok=True)
@@ -259,11 +216,8 @@ def publish(folder: Path, ready: Path, made: Mapping[str, Any] | None) -> None:
 
 def checksum_of(path: Path) -> str:
     """Return the hexadecimal SHA-256 of a file."""
-    digest = hashlib.sha256()
     with files.opened(path) as file:
-        while chunk := file.read(1 << 20):
-            digest.update(chunk)
-    return digest.hexdigest()
+        return hashlib.sha256(file.read()).hexdigest()
 
 
 def status(folder: Path) -> Iterator[str]:
@@ -272,32 +226,28 @@ def status(folder: Path) -> Iterator[str]:
     Raises:
         AntsError: The folder has no study, or its description is damaged.
     """
-    asked = asked_in(folder)
-    if not asked:
-        raise AntsError(f"{files.named(folder)} has no results; name the folder of a study.")
-    store, sessions = Store(folder), sessions_in(folder)
-    places, held = store.where(asked["points"], asked["seeds"], asked["arrays"])
-    done, manifest = places >= 0, manifest_in(folder)
+    asked, store, sessions = asked_in(folder), Store(folder), sessions_in(folder)
+    numbers, blocks = store.where(asked["points"], asked["seeds"], asked["arrays"])
+    done, manifest = numbers >= 0, json_in(folder / MANIFEST)
     if done.all() and manifest and manifest.get("study") == files.checksum_of_json(asked):
         yield f"finished: results with {count(done.size, 'run')}, since {manifest['finished']}"
         return
     seconds = np.broadcast_to(np.array(asked["seconds"])[:, None], done.shape)
     share = 100 * seconds[done].sum() / seconds.sum()
-    several = count(len(np.unique(places[done])), "block")
     yield (
         f"unfinished: {done.sum()} of {count(done.size, 'run')} done ({share:.0f} % of the work), "
-        f"in {several}"
+        f"in {count(len(np.unique(numbers[done])), 'block')}"
     )
-    for number, shards in sorted({tuple(one["shard"]) for one in sessions} - {(1, 1)}):
+    for number, shards in sorted({tuple(facts["shard"]) for facts in sessions} - {(1, 1)}):
         mine = share_of(seconds, asked["families"], number, shards)
         yield f"shard {number} of {shards}: {done[mine].sum()} of {count(mine.sum(), 'run')} done"
-    times = np.array([one.path.stat().st_mtime for one in held])
-    new = done & (times[places] > sessions[-1]["began"]) if sessions and held else done & False
+    times = np.array([block.path.stat().st_mtime for block in blocks])
+    new = done & (times[numbers] > sessions[-1]["began"]) if sessions and blocks else done & False
     if new.any() and not done.all():
         speed = seconds[new].sum() / (times.max() - sessions[-1]["began"])
         yield f"left: about {_duration(seconds[~done].sum() / speed)}"
-    yield from (f"failed: {one}" for one in (sessions[-1]["failed"] if sessions else ()))
-    if held:
+    yield from (f"failed: {block}" for block in (sessions[-1]["failed"] if sessions else ()))
+    if blocks:
         yield f"last block: {_duration(max(0.0, time.time() - times.max()))} ago"
 
 

@@ -79,9 +79,9 @@ def table(rows: Sequence[Row]) -> str:
     """Return means with 95 % bootstrap intervals, a line for each value of the first column."""
     by, *names = rows[0]
     lines = [[by, *names]]
-    for one in dict.fromkeys(row[by] for row in rows):
-        of_one = [row for row in rows if row[by] == one]
-        lines.append([str(one), *(_interval([row[name] for row in of_one]) for name in names)])
+    for condition in dict.fromkeys(row[by] for row in rows):
+        same = [row for row in rows if row[by] == condition]
+        lines.append([str(condition), *(_interval([row[name] for row in same]) for name in names)])
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     padded = ["  ".join(map(str.ljust, line, widths)).rstrip() for line in lines]
     return "\n".join([padded[0], "-" * max(map(len, padded)), *padded[1:]])

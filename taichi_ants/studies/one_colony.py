@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from taichi_ants import files
 from taichi_ants.analysis import style
-from taichi_ants.arguments import checked_capacity
 from taichi_ants.errors import AntsError, count
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ _PIECE_SECONDS = 0.2
 
 
 class Totals(NamedTuple):
-    """Totals up to a tick: food items delivered, moves tried, and moves blocked."""
+    """Totals of all worlds up to a tick: food items delivered, moves tried, and moves blocked."""
 
     tick: int
     deliveries: int
@@ -33,10 +32,10 @@ class Totals(NamedTuple):
 
     @classmethod
     def of(cls, colony: Colony) -> Totals:
-        """Return the totals of all worlds in this episode."""
+        """Return the totals of a colony in this episode."""
         now = colony.outcome()
-        counts = now.deliveries, now.moves, now.blocked
-        return cls(colony.ticks, *(int(one.sum()) for one in counts))
+        counts = (int(c.sum()) for c in (now.deliveries, now.moves, now.blocked))
+        return cls(colony.ticks, *counts)
 
 
 class Span(NamedTuple):
@@ -45,27 +44,19 @@ class Span(NamedTuple):
     from_tick: int
     to_tick: int
     foods_per_tick: float
-    blocked: float
+    blocked: float  # share of the moves
 
 
 def spans(totals: Sequence[Totals]) -> list[Span]:
-    """Return a span for each two successive totals; its `blocked` is the share of blocked moves."""
-    found = []
-    for one, next_ in pairwise(totals):
-        ticks, deliveries, moves, blocked = (b - a for a, b in zip(one, next_, strict=True))
-        found.append(Span(one.tick, next_.tick, deliveries / ticks, blocked / max(1, moves)))
-    return found
+    """Return a span for each two successive totals."""
+    rows = []
+    for before, after in pairwise(totals):
+        ticks, deliveries, moves, blocked = (b - a for a, b in zip(before, after, strict=True))
+        rows.append(Span(before.tick, after.tick, deliveries / ticks, blocked / max(1, moves)))
+    return rows
 
 
-def save_figure(rows: Sequence[Span], who: str, path: files.PathLike) -> None:
-    """Write a figure (.png) and its numbers (.csv); `who` is the start of the title."""
-    files.check_writable_folder(Path(path).parent)
-    numbers = [one._asdict() for one in rows]
-    files.write_csv(Path(path).with_suffix(".csv"), numbers, Span._fields)
-    style.save(draw(rows, who), Path(path))
-
-
-def draw(rows: Sequence[Span], who: str) -> Figure:
+def draw(rows: Sequence[Span], title: str) -> Figure:
     """Return a figure of food items per tick (above) and the share of blocked moves (below)."""
     edges = [rows[0].from_tick, *(row.to_tick for row in rows)] if rows else [0]
     with style.styled():
@@ -87,7 +78,7 @@ def draw(rows: Sequence[Span], who: str) -> Figure:
             blocked.set_xlim(edges[0], edges[-1])
         longest = max((row.to_tick - row.from_tick for row in rows), default=0)
         caption = f"Means over {longest:g} ticks. Blocked: share of the moves that fail."
-        style.frame(figure, f"{who}: food items delivered", caption, {})
+        style.frame(figure, title, caption, {})
     return figure
 
 
@@ -129,29 +120,30 @@ def live(
     least = frame_interval if animated else 1  # a span is a whole number of frames
     span = -(-ticks // (least * _MOST_SPANS)) * least if figure else ticks
     totals = [Totals.of(colony)]
+    error: Exception | None = None
     passing = _pieces(colony, ticks, progress, stopped, interval, span, totals)
     try:
         if render and animated:
-            shown = (one for _ in chain([0], passing) for one in colony_snapshots(colony))
+            shown = (s for _ in chain([0], passing) for s in colony_snapshots(colony))
             save_animation(render, frames(shown, task=colony.task), FRAMES_PER_SECOND)
         for _ in passing:
             pass
         if render and not animated:
             save_picture(render, next(frames(colony_snapshots(colony), task=colony.task)))
         if figure:
+            path, rows = Path(figure), spans(totals)
+            files.check_writable_folder(path.parent)
+            numbers = [row._asdict() for row in rows]
+            files.write_csv(path.with_suffix(".csv"), numbers, Span._fields)
             who = _who(colony.ants * len(colony.seeds), colony)
-            save_figure(spans(totals), who, figure)
-    except (AntsError, OSError):
-        # The colony is intact, because drawing happens between ticks, and may have taken hours.
-        _save(colony, save)
-        raise
-    _save(colony, save)
-
-
-def _save(colony: Colony, path: str | None) -> None:
-    if path is not None:
-        files.check_writable_folder(Path(path).parent)
-        colony.save(path)
+            style.save(draw(rows, f"{who}: food items delivered"), path)
+    except (AntsError, OSError) as raised:
+        error = raised  # the colony is intact, because drawing happens between ticks
+    if save is not None:
+        files.check_writable_folder(Path(save).parent)
+        colony.save(save)
+    if error is not None:
+        raise error
 
 
 def _pieces(
@@ -187,31 +179,16 @@ def _pieces(
 
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:
-    """Return a summary of two lines for a run of `ticks` ticks that took `seconds`.
-
-    A third one reports births that wait.
-    """
+    """Return a summary of two lines for a run of `ticks` ticks that took `seconds`."""
     outcome = {name: int(array.sum()) for name, array in colony.outcome().counts().items()}
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
-    changes = [count(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]
+    changes = [count(outcome[f"{n}s"], n) for n in ("birth", "death") if outcome[f"{n}s"]]
     changes += [f"{outcome['regrown']} regrown"] if outcome["regrown"] else []
     return (
         f"{_who(outcome['living'], colony)}, {count(ticks, 'tick')} in {seconds:.1f} s.\n"
         f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, "
-        f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}.{_waiting(colony)}"
+        f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}."
     )
-
-
-def _waiting(colony: Colony) -> str:
-    """Return a line on the births that wait, with the reason; "" if there are none."""
-    outcome = colony.outcome()
-    waiting, is_full = outcome.waiting_births, outcome.living >= colony.capacity
-    full, others = int(waiting[is_full].sum()), int(waiting[~is_full].sum())
-    usual = colony.capacity == checked_capacity(colony.task, colony.ants, None, "nest", False)
-    which = f"the {'default ' * usual}--capacity is {colony.capacity}"
-    reasons = {f"{full} until an ant dies ({which})": full, f"{others} for a free cell": others}
-    said = ", ".join(words for words, n in reasons.items() if n)
-    return f"\nBirths that wait: {said}." if said else ""
 
 
 def _who(ants: int, colony: Colony) -> str:

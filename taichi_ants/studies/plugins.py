@@ -34,41 +34,41 @@ def read_plugin(path: str | None) -> dict[str, bytes]:
     """
     if path is None:
         return {}
-    found, waiting, folder = dict[str, bytes](), [Path(path)], Path(path).parent
-    for one in waiting:
-        if str(one) in found:
+    code, waiting, folder = dict[str, bytes](), [Path(path)], Path(path).parent
+    for file in waiting:  # which grows
+        if str(file) in code:
             continue
         try:
-            found[str(one)] = one.read_bytes()
+            code[str(file)] = file.read_bytes()
         except (OSError, ValueError) as error:
             raise AntsError(
                 f"cannot read the plugin {path!r}; name a Python file (.py)."
             ) from error
-        if one.suffix == ".py" or one == Path(path):
-            waiting += _needed(folder, one, found[str(one)])
-    return found
+        if file.suffix == ".py" or file == Path(path):
+            waiting += _needed(folder, file, code[str(file)])
+    return code
 
 
 def _needed(folder: Path, path: Path, content: bytes) -> Iterator[Path]:
     """Yield the files of a folder that one of its modules needs."""
-    for end in (".toml", ".html") if path.parent == folder else ():
-        yield from sorted(folder.glob(f"{path.stem}*{end}"))
+    for suffix in (".toml", ".html") if path.parent == folder else ():
+        yield from sorted(folder.glob(f"{path.stem}*{suffix}"))
     try:
         nodes = [*ast.walk(ast.parse(content, path))]
     except SyntaxError:
         return  # which `load_plugin` reports
     names = [name.name for node in nodes if isinstance(node, ast.Import) for name in node.names]
     names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
-    installed = [one for one in sys.path if one.endswith(("site-packages", "dist-packages"))]
+    installed = [path for path in sys.path if path.endswith(("site-packages", "dist-packages"))]
     for name in dict.fromkeys(name.partition(".")[0] for name in names if name):
         module, package = folder / f"{name}.py", folder / name / "__init__.py"
-        several = [module] if module.is_file() else []
+        needed = [module] if module.is_file() else []
         if package.is_file():
-            every = sorted(package.parent.rglob("*"))
-            several = [package, *(e for e in every if e.suffix in (".py", ".toml", ".html"))]
-        if several and (name in sys.stdlib_module_names or PathFinder.find_spec(name, installed)):
-            raise AntsError(f"{str(several[0])!r} has an installed module's name; rename it.")
-        yield from several
+            inside = sorted(package.parent.rglob("*"))
+            needed = [package, *(p for p in inside if p.suffix in (".py", ".toml", ".html"))]
+        if needed and (name in sys.stdlib_module_names or PathFinder.find_spec(name, installed)):
+            raise AntsError(f"{str(needed[0])!r} has an installed module's name; rename it.")
+        yield from needed
 
 
 def load_plugin(path: str | None) -> Any:
@@ -79,16 +79,17 @@ def load_plugin(path: str | None) -> Any:
     """
     if path is None:
         return None
-    spec = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
-    if spec is None or spec.loader is None:
+    spec: Any = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
+    if spec is None:
         raise AntsError(f"cannot read the plugin {path!r}; name a Python file (.py).")
     if _finder not in sys.meta_path:
         sys.meta_path.insert(0, _finder)
     module = importlib.util.module_from_spec(spec)
     try:
-        for one in [Path(one) for one in read_plugin(path)][1:]:
-            if one.suffix == ".py" and (one.parent == Path(path).parent or one.stem == "__init__"):
-                _let_import(one)
+        for file in [*map(Path, read_plugin(path))][1:]:
+            is_beside = file.parent == Path(path).parent
+            if file.suffix == ".py" and (is_beside or file.stem == "__init__"):
+                _let_import(file)
         sys.modules[spec.name] = module  # Taichi reads the source of functions by their module
         spec.loader.exec_module(module)
     except AntsError:
@@ -107,33 +108,34 @@ def _let_import(path: Path) -> None:
     _imports[name] = importlib.util.spec_from_file_location(name, path)
     before = getattr(sys.modules.get(name), "__file__", None)
     if before and Path(before).resolve() != path.resolve():  # that of another plugin
-        for one in [one for one in sys.modules if one == name or one.startswith(f"{name}.")]:
-            del sys.modules[one]
+        for loaded in [*sys.modules]:
+            if loaded == name or loaded.startswith(f"{name}."):
+                del sys.modules[loaded]
 
 
-def load_code(several: Iterable[Code]) -> None:
+def load_code(codes: Iterable[Code]) -> None:
     """Load code that came to this process as bytes, unless it has loaded it before.
 
     Raises:
         AntsError: A file raises, or the process has loaded another file of this name.
     """
-    for code in several:
+    for code in codes:
         name, contents = Path(next(iter(code))).name, [*code.values()]
         if _loaded.setdefault(name, contents) != contents:
             raise AntsError(f"a worker has loaded another file {name!r}; start new workers.")
         if f"plugin_{Path(name).stem}" in sys.modules:
             continue
         _folders.append(tempfile.TemporaryDirectory())
-        for place, content in placed(code, Path(_folders[-1].name)).items():
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(content)  # because Taichi reads the source of functions
+        for path, content in placed(code, Path(_folders[-1].name)).items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)  # because Taichi reads the source of functions
         load_plugin(str(Path(_folders[-1].name, name)))
 
 
 def placed(code: Code, folder: Path) -> dict[Path, bytes]:
     """Return the contents of code by the paths that its files would have in another folder."""
-    own = Path(next(iter(code), "")).parent
-    return {folder / Path(one).relative_to(own): content for one, content in code.items()}
+    before = Path(next(iter(code), "")).parent
+    return {folder / Path(path).relative_to(before): content for path, content in code.items()}
 
 
 def checksum_of(code: Code) -> str:

@@ -28,7 +28,7 @@ from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, ROW
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
+    from taichi_ants.engines.colony.colony import Colony
 
 # Added to the seeds of a colony for its evaluation, so that it shares no random numbers with the
 # training.
@@ -62,9 +62,9 @@ class Drawn:
         cls, preset: str, first: int = 0, regions: Mapping[str, Any] | None = None, **settings: Any
     ) -> Drawn:
         """Return the worlds that `worlds.build(preset, first + seed, **settings)` draws."""
-        for one in worlds.settings_of(preset) if preset in worlds.names() else ():
-            if one.name in settings:  # so that equal numbers of other types are equal
-                settings[one.name] = one.checked(settings[one.name])
+        for declared in worlds.settings_of(preset) if preset in worlds.names() else ():
+            if declared.name in settings:  # so that equal numbers of other types are equal
+                settings[declared.name] = declared.checked(settings[declared.name])
         return cls(json.dumps([preset, first, settings, regions or {}], sort_keys=True))
 
     def of(self, seed: int) -> World:
@@ -156,11 +156,11 @@ class RunPoint:
         else:
             trained = train(world, configs, seeds, *lengths, task, **where, progress=progress)
             q_values = trained.q_values
-            outcome = {name: small(getattr(trained, name)) for name in _RUN_ARRAYS}
+            outcome = {name: files.small(getattr(trained, name)) for name in _RUN_ARRAYS}
             outcome["q_values"] = q_values
         greedy = evaluate(world, q_values, first.rollouts, seeds, first.max_steps, task, **where)
         of_rollouts = {f"greedy_{name}": getattr(greedy, name) for name in _RUN_ARRAYS}
-        return outcome | {name: small(array) for name, array in of_rollouts.items()}
+        return outcome | {name: files.small(array) for name, array in of_rollouts.items()}
 
 
 @dataclass(frozen=True)
@@ -248,19 +248,14 @@ class ColonyPoint:
         arguments.check_learner(config, self.task, self.sharing)
         _check_policy(self.policy, self.episodes)
         rule = self.task.choice
-        if not rule.needs_table and (self.episodes or self.policy or self.after):
-            given = "a policy is given" if self.policy else f"episodes is {self.episodes}"
-            raise AntsError(
-                f"`task.choice.rule` is {rule.rule!r}, which needs no action values, but {given}; "
-                "set episodes = 0 and leave out policy."
-            )
+        for name in ("episodes", "policy", "after", "evaluation_epsilon"):
+            if not rule.needs_table and getattr(self, name) not in (None, 0):
+                raise AntsError(
+                    f"{name} has no effect if `task.choice.rule` is {rule.rule!r}, by which ants "
+                    "choose without action values; set episodes = 0, and leave out the others."
+                )
         if self.evaluation_epsilon is not None:
             arguments.checked_share("evaluation_epsilon", self.evaluation_epsilon)
-            if not rule.needs_table:
-                raise AntsError(
-                    f"evaluation_epsilon is {self.evaluation_epsilon}, but `task.choice.rule` is "
-                    f"{rule.rule!r}, with which ants do not explore; leave it out."
-                )
         without_training = self.after or self.policy or not rule.needs_table
         more = "" if without_training else "; 0 requires a policy"
         checked_whole("episodes", self.episodes, 0 if without_training else 1, otherwise=more)
@@ -271,18 +266,14 @@ class ColonyPoint:
         check_one_of("during", self.during, DURING)
         self._check_protocol()
         if self.after and (self.after.sharing != "shared" or not self.after.episodes):
-            raise AntsError(
-                "`after` has no shared table; it must be a point with sharing='shared' and at "
-                "least one episode."
-            )
+            raise AntsError("`after` has no shared table; set its sharing='shared' and episodes.")
 
     def _check_protocol(self) -> None:
         """Raise an AntsError, which names the event, if it can never happen as it should."""
         for learns in (True, False) if self.episodes else (False,):
-            pool = self.pool if learns else ()
-            world = (pool or self.places_of_evaluation)[0]
+            world = self.pool[0] if learns and self.pool else self.first_world
             for event in self.events(learns):
-                number = [one for one in self.protocol if one.path == event.path].index(event) + 1
+                of_path = [other for other in self.protocol if other.path == event.path]
                 try:
                     event.times(self.ticks)
                     for intervention in event.interventions:
@@ -290,61 +281,45 @@ class ColonyPoint:
                     if isinstance(event, When):
                         measures.check_part(event.measure, world, self.task, single=True)
                 except AntsError as error:
+                    number = of_path.index(event) + 1
                     raise AntsError(
                         f"in [[{event.path}]] number {number}, in the {DURING[learns]}, {error}"
                     ) from error
 
     @property
-    def places_of_evaluation(self) -> tuple[World, ...]:
-        """The worlds of the evaluation that checks look at: one, if each seed draws its own."""
-        return (self.world.of(0) if isinstance(self.world, Drawn) else self.world,)
+    def first_world(self) -> World:
+        """The world of the evaluation; that of seed 0, if each seed draws its own."""
+        return self.world.of(0) if isinstance(self.world, Drawn) else self.world
 
     alike = property(lambda self: self)  # each point has its own blocks
 
     @property
     def runs_of_a_block(self) -> int:
         """The number of seeds of a block, whose colonies run together, as memory allows."""
-        if any(isinstance(one, When) and one.in_all_worlds for one in self.protocol):
+        if any(isinstance(event, When) and event.in_all_worlds for event in self.protocol):
             return 1  # a condition of one world must not change what all share
-        world = self.places_of_evaluation[0]
         slots, states = self.capacity or self.ants, self.task.n_states
         memory = learners.get(self.training.learner).memory_for(self.training, states)
         table = (1 + memory.tables) * states * ROW + memory.floats + memory.integers
         owners = slots if self.sharing == "independent" else 1
-        ants, cells = slots * _NUMBERS_OF_AN_ANT, world.grid.size * _NUMBERS_OF_A_CELL
+        ants, cells = slots * _NUMBERS_OF_AN_ANT, self.first_world.grid.size * _NUMBERS_OF_A_CELL
         fits = _NUMBERS_OF_A_BLOCK // (ants + cells + owners * table)
         return max(1, min(fits, round(_SECONDS_OF_A_BLOCK / self.seconds)))
 
     @property
     def seconds(self) -> float:
         """The approximate time of a seed on one processor."""
-        world = self.places_of_evaluation[0]
-        cells = sum(
-            world.grid.size * (_WORK_OF_DIFFUSION if one.diffusion else _WORK_OF_A_CELL)
-            for one in (self.task.pheromone, *self.task.fields.values())
-            if one.dense
+        cells = self.first_world.grid.size * sum(
+            _WORK_OF_DIFFUSION if field.diffusion else _WORK_OF_A_CELL
+            for field in (self.task.pheromone, *self.task.fields.values())
+            if field.dense
         )
         ticks = self.ticks * (self.episodes + self.rollouts)
         return (self.ants + cells) * ticks / _TICKS_OF_A_SECOND
 
-    @property
-    def exploration(self) -> float:
-        """The exploration rate of the evaluation."""
-        if self.evaluation_epsilon is not None:
-            return self.evaluation_epsilon
-        return 0.0 if self.policy else self.training.least_epsilon
-
     def events(self, learns: bool) -> tuple[ProtocolEvent, ...]:
         """Return the events of episodes of training or, if not `learns`, of the evaluation."""
         return self.protocol if self.during in ("both", DURING[learns]) else ()
-
-    def places(self, seeds: Sequence[int]) -> list[list[World]] | None:
-        """Return the world of each training episode and seed; None without a pool."""
-        if self.pool is None:
-            return None
-        streams = [np.random.default_rng(seed % 2**64) for seed in seeds]
-        draws = [stream.integers(len(self.pool), size=self.episodes) for stream in streams]
-        return [[self.pool[n] for n in of_episode] for of_episode in np.transpose(draws)]
 
     def colony(
         self, world: Any, seeds: Sequence[int], q_values: Any, learns: bool, **options: Any
@@ -358,12 +333,13 @@ class ColonyPoint:
         training: TrainingConfig | None = self.training
         if not learns:
             seeds = [seed + EVALUATION_SEEDS for seed in seeds]
-            training = TrainingConfig.frozen(self.exploration)
+            least = 0.0 if self.policy else self.training.least_epsilon
+            epsilon = least if self.evaluation_epsilon is None else self.evaluation_epsilon
+            training = TrainingConfig.frozen(epsilon)
         if not self.task.choice.needs_table:
             training = None
-        sharing = self.sharing if learns else "frozen"
         options |= {"ants": self.ants, "capacity": self.capacity, "start": self.start}
-        options |= {"sharing": sharing, "q_values": q_values}
+        options |= {"sharing": self.sharing if learns else "frozen", "q_values": q_values}
         return Colony(world, self.task, training, seeds, **options)
 
     @staticmethod
@@ -380,16 +356,25 @@ class ColonyPoint:
         """
         (point,) = points
         share = point.episodes / (point.episodes + point.rollouts)
-        tables = point.tables(seeds, learned, part_of(progress, 0.0, share), where)
+        tables = point.tables(seeds, learned, lambda done: progress(share * done), where)
         colony = point.colony(point.worlds(seeds), seeds, tables, False, **where)
         episodes = colony.run(
-            *(point.rollouts, point.ticks, part_of(progress, share, 1 - share)),
+            point.rollouts,
+            point.ticks,
+            lambda done: progress(share + (1 - share) * done),
             measures=point.measures,
             every=point.measure_every,
             protocol=point.events(learns=False),
         )
-        outcome = {name: small(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
-        outcome |= _series_of(episodes, point)
+        outcome = {name: files.small(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
+        if (series := episodes.series) is not None:
+            for name in series.maps:
+                raise AntsError(
+                    f"the measure {name!r} is an array; choose measures that give numbers."
+                )
+            shape = point.rollouts, -1, len(seeds)  # all worlds run for all ticks
+            for name, values in series.values.items():
+                outcome[f"{SERIES}{name}"] = np.moveaxis(values.reshape(shape), -1, 0)
         if point.episodes and point.sharing == "shared":
             outcome["q_values"] = tables
         return {name: array[None] for name, array in outcome.items()}
@@ -403,31 +388,20 @@ class ColonyPoint:
         """
         if not self.episodes:
             return self.policy.q_values if self.policy else learned
-        places = self.places(seeds)
-        first = places[0] if places else self.worlds(seeds)
+        worlds, protocol = None, self.events(learns=True)
+        if self.pool is not None:  # a world for each episode and seed
+            streams = [np.random.default_rng(seed % 2**64) for seed in seeds]
+            draws = [stream.integers(len(self.pool), size=self.episodes) for stream in streams]
+            worlds = [[self.pool[n] for n in of_episode] for of_episode in np.transpose(draws)]
+        first = worlds[0] if worlds else self.worlds(seeds)
         learning = self.colony(first, seeds, learned, True, **where)
-        protocol = self.events(learns=True)
-        learning.run(self.episodes, self.ticks, progress, places, protocol=protocol)
+        learning.run(self.episodes, self.ticks, progress, worlds, protocol=protocol)
         return learning.q_values
 
     def worlds(self, seeds: Sequence[int]) -> Any:
         """Return the world, or those of some seeds."""
         world = self.world
         return [world.of(seed) for seed in seeds] if isinstance(world, Drawn) else world
-
-
-def _series_of(episodes: ColonyEpisodes, point: ColonyPoint) -> Outcome:
-    """Return the series of measures, float64 (seeds, rollouts, rows) by "series_NAME"."""
-    series = episodes.series
-    if series is None:
-        return {}
-    for name in series.maps:
-        raise AntsError(f"the measure {name!r} is an array; choose measures that give numbers.")
-    shape = point.rollouts, -1, len(episodes.seeds)  # all worlds run for all ticks
-    return {
-        f"{SERIES}{name}": np.moveaxis(values.reshape(shape), -1, 0)
-        for name, values in series.values.items()
-    }
 
 
 Point = RunPoint | ColonyPoint
@@ -442,8 +416,8 @@ def key_of(point: Point, *more: str) -> str:
     facts = {"physics": PHYSICS, "kind": point.kind, "more": more, **_changed(point)}
     castes = {name: caste.policy for name, caste in point.task.castes.items() if caste.policy}
     if castes:  # whose policies are named by their files
-        named = ((name, FixedPolicy.named(one, point.task)) for name, one in castes.items())
-        facts["castes"] = {name: one.sha256 for name, one in named}
+        named = ((name, FixedPolicy.named(path, point.task)) for name, path in castes.items())
+        facts["castes"] = {name: policy.sha256 for name, policy in named}
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:32]
 
 
@@ -458,22 +432,24 @@ def _changed(value: Any) -> Any:
     if isinstance(value, ProtocolEvent):
         return value.facts()
     if isinstance(value, Mapping):  # in which the order of the names counts
-        return [[name, _changed(one)] for name, one in value.items()]
+        return [[name, _changed(entry)] for name, entry in value.items()]
     if hasattr(value, "__dataclass_fields__"):
-        found = {one.name: getattr(value, one.name) for one in fields(value)}
-        own = {one.name: found[one.name] for one in fields(value) if found[one.name] != _usual(one)}
+        pairs = ((getattr(value, each.name), each) for each in fields(value))
+        own = {each.name: setting for setting, each in pairs if setting != _default(each)}
         if isinstance(value, TrainingConfig):
-            usual = learners.get(value.learner).hyperparameters()
-            more = {n: v for n, v in value.hyperparameters if v != getattr(usual, n, None)}
+            defaults = learners.get(value.learner).hyperparameters()
+            more = {n: v for n, v in value.hyperparameters if v != getattr(defaults, n, None)}
             own["hyperparameters"] = sorted(more.items())
-        return {name: _changed(one) for name, one in own.items()}
+        return {name: _changed(setting) for name, setting in own.items()}
     if isinstance(value, (list, tuple)):
-        return [_changed(one) for one in value]
+        return [_changed(element) for element in value]
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _usual(one: Field[Any]) -> Any:
-    return one.default if one.default_factory is MISSING else one.default_factory()
+def _default(declared: Field[Any]) -> Any:
+    if declared.default_factory is MISSING:
+        return declared.default
+    return declared.default_factory()
 
 
 @lru_cache(4096)
@@ -483,58 +459,57 @@ def _sum_of(world: World) -> str:
     return files.checksum_of_json([world_facts(world), regions])[:32]
 
 
-def small(array: np.ndarray) -> np.ndarray:
-    """Return integers as the smallest signed type that holds them.
-
-    Signed, so that the type of joined blocks does not depend on how runs were cut into blocks.
-    """
-    low, high = int(array.min(initial=0)), int(array.max(initial=0))
-    return array.astype(np.min_scalar_type(min(low, -1 - high)))
-
-
 def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]:
     """Return everything that determines the results of points and seeds, by name.
 
     Settings that all points share are single values; others are lists with an entry per point.
     """
-    points = tuple(dict.fromkeys(one for point in points for one in chain(point)))
-    places: list[Any] = [place for one in points for place in (one.world, one.pool) if place]
-    worlds = list(dict.fromkeys(places))
-    numbers = {one: number for several in (points, worlds) for number, one in enumerate(several)}
-    drawn = {one: tuple(map(one.of, seeds)) for one in worlds if isinstance(one, Drawn)}
-    rows = [facts_of(point, lambda name, value: numbers[value]) for point in points]
-    names = dict.fromkeys(name for row in rows for name in row)
-    columns = {name: [row.get(name) for row in rows] for name in names}
+    points = tuple(dict.fromkeys(earlier for point in points for earlier in chain(point)))
+    each = (map(w.of, seeds) if isinstance(w, Drawn) else w for w in _worlds_of(points))
+    columns = columns_of(points).items()
     return {
         "version": __version__,
         "seeds": list(seeds),
         "worlds": [
-            [world_facts(one) for one in world] if isinstance(world, tuple) else world_facts(world)
-            for world in (drawn.get(one, one) for one in worlds)
+            world_facts(worlds) if isinstance(worlds, World) else [*map(world_facts, worlds)]
+            for worlds in each
         ],
         **{
-            name: values[0] if all(one == values[0] for one in values) else values
-            for name, values in columns.items()
+            name: values[0] if all(v == values[0] for v in values) else values
+            for name, values in columns
         },
     }
 
 
-def facts_of(point: Point, number_of: Callable[[str, Any], Any]) -> dict[str, Any]:
-    """Return the settings of a point by name.
+def _worlds_of(points: Sequence[Point]) -> list[Any]:
+    """Return the worlds of points, recipes and pools, in order of appearance."""
+    return list(dict.fromkeys(w for p in points for w in (p.world, p.pool) if w))
 
-    `number_of` gets the name and the value of a world, several worlds or another point, and returns
-    what represents it.
+
+def columns_of(points: Sequence[Point]) -> dict[str, list[Any]]:
+    """Return the settings of points by name, each a list with an entry per point.
+
+    Numbers represent worlds, and other points. A point that lacks a setting has None.
     """
-    found = {one.name: getattr(point, one.name) for one in fields(point)}
-    for name in ("world", "pool", "after"):
-        found |= {name: number_of(name, found[name])} if found.get(name) else {}
-    protocol, during = found.pop("protocol", ()), found.pop("during", "")
-    if protocol:
-        found |= {"protocol": [event.facts() for event in protocol], "during": during}
-    found = {k: v for k, v in found.items() if k not in _LATER or v not in (None, ())}
-    if policy := found.get("policy"):
-        found["policy"] = {"name": policy.name, "sha256": policy.sha256}
-    return flat({**found, "task": point.task.as_dict(), "training": point.training.as_dict()})
+    numbers = {
+        value: n for values in (points, _worlds_of(points)) for n, value in enumerate(values)
+    }
+    rows = []
+    for point in points:
+        row = {field.name: getattr(point, field.name) for field in fields(point)}
+        for name in ("world", "pool", "after"):
+            row |= {name: numbers.get(row[name])} if row.get(name) else {}
+        protocol, during = row.pop("protocol", ()), row.pop("during", "")
+        if protocol:
+            row |= {"protocol": [event.facts() for event in protocol], "during": during}
+        row = {k: v for k, v in row.items() if k not in _LATER or v not in (None, ())}
+        if policy := row.get("policy"):
+            row["policy"] = {"name": policy.name, "sha256": policy.sha256}
+        rows.append(
+            flat({**row, "task": point.task.as_dict(), "training": point.training.as_dict()})
+        )
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: [row.get(name) for row in rows] for name in names}
 
 
 def world_facts(world: World) -> dict[str, Any]:
@@ -556,7 +531,3 @@ def world_facts(world: World) -> dict[str, Any]:
 def chain(point: Any) -> list[Any]:
     """Return a point after the one that is its `after`, and so on."""
     return [*chain(point.after), point] if point.after is not None else [point]
-
-
-def part_of(progress: Progress, begin: float, share: float) -> Progress:
-    return lambda done: progress(begin + share * done)

@@ -8,10 +8,8 @@ import platform
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from email.message import Message
-from email.parser import HeaderParser
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -23,7 +21,6 @@ from taichi_ants import __version__
 
 # Packages that results depend on, if this package runs without being installed.
 _DIRECT = ("taichi", "numpy", "scipy", "matplotlib")
-_OF_DEVELOPERS = {"test", "dev", "bench", "lessons"}  # extras that no command imports
 
 
 def provenance(arguments: Sequence[str]) -> dict[str, Any]:
@@ -51,67 +48,36 @@ def source() -> dict[str, Any]:
 
     Clean means that no tracked file differed from the commit. Both are None outside of a checkout.
     """
-    nothing = {"commit": None, "clean": None}
     root = Path(__file__).resolve().parents[2]
-    if not (root / ".git").exists():
-        return nothing
     command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty"]
     how: dict[str, Any] = {"stderr": subprocess.DEVNULL, "text": True, "timeout": 10}
-    try:
-        described = subprocess.check_output(command, cwd=root, **how).strip()
-    except (OSError, subprocess.SubprocessError):
-        return nothing
-    return {"commit": described.removesuffix("-dirty"), "clean": not described.endswith("-dirty")}
+    with suppress(OSError, subprocess.SubprocessError):
+        if (root / ".git").exists():
+            described = subprocess.check_output(command, cwd=root, **how).strip()
+            commit, _, changed = described.partition("-")
+            return {"commit": commit, "clean": not changed}
+    return {"commit": None, "clean": None}
 
 
 def packages() -> dict[str, str]:
-    """Return the versions of this package and of all installed ones that it depends on, by name.
+    """Return the versions of this package and of those that it depends on, also indirectly.
 
-    Includes the dependencies of dependencies, and packages of extras if this process has imported
-    them.
+    Includes packages of extras if this process has imported them.
     """
-    found: dict[str, str] = {}
-    waiting = [("taichi-ants", frozenset[str]()), *((name, frozenset[str]()) for name in _DIRECT)]
-    done = set()
-    while waiting:
-        name, extras = waiting.pop()
-        if (name, extras) in done:
-            continue
-        done.add((name, extras))
+    imported = {canonicalize_name(name) for name in sys.modules if "." not in name}
+    versions, waiting = dict[str, str](), ["taichi-ants", *_DIRECT]
+    for name in waiting:  # which grows
         with suppress(metadata.PackageNotFoundError):
-            facts = _facts_of(name)
-            found[name] = facts["Version"]
-            waiting.extend(_needed(name, facts, extras))
-    found.pop("taichi-ants", None)
-    return {"taichi_ants": __version__, **dict(sorted(found.items()))}
-
-
-def _facts_of(name: str) -> Message:
-    """Return the metadata of a package without its description, which takes long to parse."""
-    found = metadata.distribution(name)
-    text = found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
-    return HeaderParser().parsestr(text.partition("\n\n")[0])
-
-
-def _needed(
-    name: str, facts: Message, extras: frozenset[str]
-) -> Iterator[tuple[str, frozenset[str]]]:
-    """Yield the packages, with their extras, that a package with some extras requires."""
-    is_own = name == "taichi-ants"
-    if is_own:
-        extras = frozenset(facts.get_all("Provides-Extra") or ()) - _OF_DEVELOPERS
-    for text in facts.get_all("Requires-Dist") or ():
-        one = Requirement(text)
-        marker, other = one.marker, canonicalize_name(one.name)
-        always = marker is None or marker.evaluate({"extra": ""})
-        chosen = marker is not None and any(marker.evaluate({"extra": each}) for each in extras)
-        if always or (chosen and (not is_own or _is_imported(other))):
-            yield other, frozenset(one.extras)
-
-
-def _is_imported(name: str) -> bool:
-    """Return whether this process has imported the package of a distribution."""
-    return any(name == canonicalize_name(module) for module in sys.modules if "." not in module)
+            if name in versions:
+                continue
+            versions[name] = metadata.version(name)
+            for needed in map(Requirement, metadata.requires(name) or ()):
+                other = canonicalize_name(needed.name)
+                is_always = needed.marker is None or needed.marker.evaluate({"extra": ""})
+                if is_always or (name == "taichi-ants" and other in imported):
+                    waiting.append(other)
+    versions.pop("taichi-ants", None)
+    return {"taichi_ants": __version__, **dict(sorted(versions.items()))}
 
 
 def processor() -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
@@ -14,11 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import taichi_ants
-from taichi_ants.errors import AntsError, count, imported
+from taichi_ants.errors import AntsError, imported
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies.executors import RESUME, LostWorkersError
 
 _LOOK_EVERY, _PATIENCE, _RETRIES = 5.0, 3.0, 3  # seconds between looks, and for an answer
+_LEAST = 64  # workers for which there is work in advance
 # Ray reads them when it starts: it sends no statistics, and prints fatal errors only.
 _ENVIRONMENT = {
     "RAY_USAGE_STATS_ENABLED": "0",
@@ -65,13 +65,13 @@ class RayWorkers(Executor):
                     "RAY_AUTH_TOKEN to the one that `ray get-auth-token` prints on the head."
                 ) from error
         self._head: str = self._ray.get_runtime_context().gcs_address
-        self._needs = {"CPU": threads, "GPU": int(arch == "cuda")}
-        needs = {"num_cpus": threads, "num_gpus": self._needs["GPU"]}
-        self._remote = self._ray.remote(**needs, max_retries=_RETRIES)
+        gpus = int(arch == "cuda")
+        self._remote = self._ray.remote(num_cpus=threads, num_gpus=gpus, max_retries=_RETRIES)
         self._tasks: dict[Callable[..., Any], Any] = {}
-        self._looked, self.num_workers = 0.0, 1
-        self._ended = threading.Event()
-        threading.Thread(target=self._count, daemon=True).start()
+        has = self._ray.cluster_resources()
+        room = min(int(has.get(name, 0) // n) for name, n in (("CPU", threads), ("GPU", gpus)) if n)
+        self.num_workers = max(_LEAST, room)  # for machines that join later
+        self._looked = time.monotonic()
 
     def submit(self, call: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
         """Return the future of a call in a worker."""
@@ -94,15 +94,6 @@ class RayWorkers(Executor):
         else:
             mine.set_exception(BrokenExecutor(type(error).__name__))
 
-    def _count(self) -> None:
-        """Count workers in another thread, because Ray waits a minute for a dead head."""
-        while not self._ended.is_set():
-            with suppress(Exception):  # `check` reports a dead head
-                has = self._ray.cluster_resources()
-                room = (has.get(name, 0) // n for name, n in self._needs.items() if n)
-                self.num_workers = max(1, int(min(room)))
-            self._ended.wait(_LOOK_EVERY)
-
     def check(self) -> None:
         """Raise LostWorkersError if the head has died; Ray would end this process without a word.
 
@@ -118,12 +109,7 @@ class RayWorkers(Executor):
             f"the head of the Ray cluster at {self._head!r} does not answer any more; {RESUME}."
         )
 
-    def state(self) -> str:
-        """Return the number of workers, for progress bars."""
-        return count(self.num_workers, "worker")
-
     def __exit__(self, *raised: object) -> None:
-        self._ended.set()
         self._ray.shutdown()
 
 
@@ -138,11 +124,11 @@ def _check_listens(address: str) -> None:
     host, _, port = address.rpartition(":")
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=_PATIENCE).close()
-    except OSError as error:
-        why = error.strerror or str(error) or type(error).__name__
+    except (OSError, ValueError, OverflowError) as error:  # ValueError: the port is not a number
+        why = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise AntsError(
-            f"no Ray cluster listens at {address!r} ({why}); give the address that `ray start` has "
-            "printed, or --ray alone to use this machine."
+            f"no Ray cluster listens at {address!r} ({why}); give HOST:PORT, which `ray start` has "
+            "printed, or --ray as the last option to use this machine."
         ) from error
 
 

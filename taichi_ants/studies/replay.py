@@ -3,39 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.colony.timetable import Timetable
-from taichi_ants.engines.runs.traces import rollout
+from taichi_ants.engines.runs.training import rollout
 from taichi_ants.errors import AntsError, checked_whole, count
+from taichi_ants.studies.command import opened
 from taichi_ants.studies.points import ColonyPoint, key_of
 from taichi_ants.studies.store import Arrays, Store
 from taichi_ants.studies.study import Q_VALUES, Study, outcome_of
-from taichi_ants.viewer import Recorder, Recording, record_trace
+from taichi_ants.viewer import Recorder, Recording, record_trace, save_page
 
 
-def run_of(study: Study, rows: list[int], number: int) -> tuple[int, int]:
-    """Return the indices of the point and the seed in row `number`, from 1, of a table of runs.
+def play(folder: Path, number: int, threads: int | None) -> None:
+    """Compute row `number`, from 1, of a table of runs again, and write a page that plays it.
 
-    `rows` are the indices of points in the order of the table, each with a row for each seed.
+    Raises:
+        AntsError: The folder has no such row, or the new numbers differ from those in the store.
     """
-    runs = len(rows) * len(study.seeds)
-    row, seed = divmod(checked_whole("row", number, 1, runs) - 1, len(study.seeds))
-    return rows[row], seed
+    with opened(folder) as planned:
+        study, title = planned.study, f"Row {number} of {folder.name}"
+        order = getattr(planned.plan, "order", range(len(study.points)))  # of points in the table
+        checked_whole("row", number, 1, len(order) * len(study.seeds))
+        row, s = divmod(number - 1, len(study.seeds))
+        where = {"threads": threads, "arch": planned.facts["arch"]}
+        recording, values = replay(study, Store(folder), order[row], s, title, **where)
+    path = folder / f"row-{number}.html"
+    save_page(path, recording)
+    print(f"seed {study.seeds[s]}")
+    for name, array in values.items():
+        if array[0, 0].ndim == 0:
+            print(f"{name} {array[0, 0]:g}")
+    print(f"The new numbers are those of the row. Open {path} to see its first episode.")
 
 
 def replay(
-    study: Study, store: Store, place: int, s: int, title: str = "", **where: Any
+    study: Study, store: Store, p: int, s: int, title: str = "", **where: Any
 ) -> tuple[Recording, Arrays]:
     """Compute a run of a store again, and return a recording of the first episode of evaluation.
 
     Args:
         study, store: The study, and the store with the run.
-        place, s: The indices of the point and the seed.
+        p, s: The indices of the point and the seed.
         title: The title of the page.
         where: The arguments `threads` and `arch` of `train`.
 
@@ -45,21 +59,22 @@ def replay(
     Raises:
         AntsError: The store lacks the run, or the new numbers differ from those in the store.
     """
-    point, seed = study.points[place], study.seeds[s]
+    point, seed = study.points[p], study.seeds[s]
     try:
-        kept = store.read([study.keys[place]], [seed], study.arrays)
+        kept = store.read([study.keys[p]], [seed], study.arrays)
     except KeyError:
         raise AntsError("this run is missing; finish the study first.") from None
     learned = None
     if point.after is not None:
         after = store.read([key_of(point.after, *study.salt)], [seed], (Q_VALUES,))
         learned = after[Q_VALUES][0]
-    every = dict.fromkeys((*study.arrays, Q_VALUES))
-    found = outcome_of([point], [seed], learned, study.measure, [*every], where, None)
+    has_table = point.episodes and getattr(point, "sharing", "shared") == "shared"
+    every = [*dict.fromkeys((*study.arrays, *[Q_VALUES] * bool(has_table)))]
+    again = outcome_of([point], [seed], learned, study.measure, every, where, None)
     differ = [
         name
         for name, array in kept.items()
-        if not np.array_equal(array, found[name], equal_nan=array.dtype.kind == "f")
+        if not np.array_equal(array, again[name], equal_nan=array.dtype.kind == "f")
     ]
     if differ:
         raise AntsError(
@@ -67,37 +82,24 @@ def replay(
             "the store; use the version that computed it."
         )
     if not isinstance(point, ColonyPoint):
-        table = point.policy.q_values if point.policy else found[Q_VALUES][0, 0]
+        table = point.policy.q_values if point.policy else again[Q_VALUES][0, 0]
         trace = rollout(point.world, table, seed, 0, point.max_steps, point.task)
         return record_trace(trace, title), kept
-    if Q_VALUES in found:
-        tables = found[Q_VALUES][0]
-    else:
+    tables = again.get(Q_VALUES, [None])[0]
+    if tables is None:
         tables = point.tables([seed], learned, lambda share: None, where)
     colony = point.colony(point.worlds([seed]), [seed], tables, False, **where)
-    return _record(colony, point, title), kept
-
-
-def _record(colony: Colony, point: ColonyPoint, title: str) -> Recording:
-    """Return a recording of the first episode of an evaluation, with its events."""
     colony.begin_episode(point.ticks)
     recorder = Recorder(colony, 0, title)
-    timetable = Timetable(colony, point.events(learns=False), point.ticks)
     frames = [recorder.snapshot()]
-    with timetable:
-        for _ in timetable.pieces(_Frames(recorder, frames), point.ticks):  # type: ignore[arg-type]
-            pass
-    return Recording(recorder.header(), frames)
 
-
-@dataclass
-class _Frames:
-    """A stepper that records a frame of each tick."""
-
-    recorder: Recorder
-    frames: list[bytes]
-
-    def pieces(self, colony: Colony, n: int) -> Iterator[None]:
+    def stepped(colony: Colony, n: int) -> Iterator[None]:
         for _ in range(n):
-            self.frames.append(self.recorder.tick())
+            frames.append(recorder.tick())
             yield
+
+    timetable = Timetable(colony, point.events(learns=False), point.ticks)
+    with timetable:
+        for _ in timetable.pieces(SimpleNamespace(pieces=stepped), point.ticks):  # type: ignore[arg-type]
+            pass
+    return Recording(recorder.header(), frames), kept

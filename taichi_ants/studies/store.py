@@ -31,20 +31,16 @@ Arrays = dict[str, np.ndarray]  # by name; in a store each is (points, seeds, ..
 
 def parts_of(name: str, names: Iterable[str]) -> list[str]:
     """Return those of some names of arrays that are an array, or its parts."""
-    return [one for one in names if one == name or one.startswith(f"{name}.")]
+    return [array for array in names if array == name or array.startswith(f"{name}.")]
 
 
-class Held(NamedTuple):
+class Stored(NamedTuple):
     """The contents of a file: keys of points, seeds, and names of arrays."""
 
     path: Path
     points: tuple[str, ...]
     seeds: tuple[int, ...]
     arrays: tuple[str, ...]
-
-    def has(self, arrays: Iterable[str]) -> bool:
-        """Return whether the file has these arrays, or their parts."""
-        return all(parts_of(name, self.arrays) for name in arrays)
 
 
 class DamagedError(AntsError):
@@ -61,22 +57,22 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder / BLOCKS
         self.damaged: list[Path] = []
-        self._held: dict[str, Held] = {}  # by file name
+        self._blocks: dict[str, Stored] = {}  # by file name
         self.refresh()
 
     def refresh(self) -> None:
         """Take notice of the files that other processes have added or removed."""
         names = set(os.listdir(self.folder)) if self.folder.is_dir() else set()
-        self._held = {name: one for name, one in self._held.items() if name in names}
-        for name in sorted(names - self._held.keys()):
-            if name.endswith(".npz") and (one := _header(self.folder / name)):
-                self._held[name] = one
+        self._blocks = {name: block for name, block in self._blocks.items() if name in names}
+        for name in sorted(names - self._blocks.keys()):
+            if name.endswith(".npz") and (block := _header(self.folder / name)):
+                self._blocks[name] = block
             elif name.endswith(".npz"):
                 self._set_aside(self.folder / name)
 
     def where(
         self, points: Sequence[str], seeds: Sequence[int], arrays: Sequence[str]
-    ) -> tuple[np.ndarray, list[Held]]:
+    ) -> tuple[np.ndarray, list[Stored]]:
         """Return which file has all of these arrays of each run.
 
         Returns:
@@ -84,13 +80,17 @@ class Store:
         """
         rows = {key: n for n, key in enumerate(points)}
         columns = {seed: n for n, seed in enumerate(seeds)}
-        held = [one for one in self._held.values() if one.has(arrays)]
-        found = np.full((len(points), len(seeds)), -1)
-        for number, one in enumerate(held):
-            at = [rows[key] for key in one.points if key in rows]
-            of = [columns[seed] for seed in one.seeds if seed in columns]
-            found[np.ix_(at, of)] = number
-        return found, held
+        blocks = [
+            block
+            for block in self._blocks.values()
+            if all(parts_of(name, block.arrays) for name in arrays)
+        ]
+        numbers = np.full((len(points), len(seeds)), -1)
+        for number, block in enumerate(blocks):
+            p = [rows[key] for key in block.points if key in rows]
+            s = [columns[seed] for seed in block.seeds if seed in columns]
+            numbers[np.ix_(p, s)] = number
+        return numbers, blocks
 
     def add(self, points: Sequence[str], seeds: Sequence[int], arrays: Arrays) -> None:
         """Write a block of runs; AntsError if it cannot be written."""
@@ -100,7 +100,7 @@ class Store:
         with files.writing(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
         files.write_atomically(path, lambda file: np.savez(file, **content))
-        self._held[path.name] = Held(path, tuple(points), tuple(seeds), tuple(arrays))
+        self._blocks[path.name] = Stored(path, tuple(points), tuple(seeds), tuple(arrays))
 
     def read(
         self, points: Sequence[str], seeds: Sequence[int], arrays: Sequence[str], part: bool = False
@@ -113,43 +113,44 @@ class Store:
             DamagedError: A file cannot be read.
             KeyError: Runs are missing.
         """
-        places, held = self.where(points, seeds, arrays)
-        if (places < 0).any() and not part:
-            raise KeyError(f"{(places < 0).sum()} runs are missing in {files.named(self.folder)}")
-        found: Arrays = {}
-        for number in np.unique(places[places >= 0]):
-            one, (at, of) = held[number], np.nonzero(places == number)
-            row = {key: n for n, key in enumerate(one.points)}
-            column = {seed: n for n, seed in enumerate(one.seeds)}
-            own = (
-                np.array([row[points[p]] for p in at.tolist()]),
-                np.array([column[seeds[s]] for s in of.tolist()]),
+        numbers, blocks = self.where(points, seeds, arrays)
+        if (numbers < 0).any() and not part:
+            raise KeyError(f"{(numbers < 0).sum()} runs are missing in {files.named(self.folder)}")
+        whole: Arrays = {}
+        for number in np.unique(numbers[numbers >= 0]):
+            block, (p, s) = blocks[number], np.nonzero(numbers == number)
+            row = {key: n for n, key in enumerate(block.points)}
+            column = {seed: n for n, seed in enumerate(block.seeds)}
+            inside = (
+                np.array([row[points[n]] for n in p.tolist()]),
+                np.array([column[seeds[n]] for n in s.tolist()]),
             )
-            for name, array in self._arrays(one, arrays).items():
-                whole = found.get(name)
-                if whole is None:
+            for name, array in self._arrays(block, arrays).items():
+                if name not in whole:
                     nothing = np.nan if array.dtype.kind == "f" else 0
-                    whole = np.full((*places.shape, *array.shape[2:]), nothing, array.dtype)
-                found[name] = whole.astype(np.promote_types(whole.dtype, array.dtype), copy=False)
-                found[name][at, of] = array[own]
-        return found
+                    shape = *numbers.shape, *array.shape[2:]
+                    whole[name] = np.full(shape, nothing, array.dtype)
+                kind = np.promote_types(whole[name].dtype, array.dtype)
+                whole[name] = whole[name].astype(kind, copy=False)
+                whole[name][p, s] = array[inside]
+        return whole
 
-    def _arrays(self, one: Held, names: Sequence[str]) -> Arrays:
+    def _arrays(self, block: Stored, names: Sequence[str]) -> Arrays:
+        parts = [part for name in names for part in parts_of(name, block.arrays)]
         try:
-            with _opened(one.path) as file:
-                several = (part for name in names for part in parts_of(name, one.arrays))
-                return {name: file[name] for name in several}  # zipfile checks their CRC-32
+            with _opened(block.path) as file:
+                return {part: file[part] for part in parts}  # zipfile checks their CRC-32
         except MemoryError:
             raise
         except Exception as error:  # zipfile, zlib and NumPy raise many kinds
-            self._set_aside(one.path)
+            self._set_aside(block.path)
             raise DamagedError(
-                f"{files.named(one.path)} is damaged, so its runs are missing; run the command "
+                f"{files.named(block.path)} is damaged, so its runs are missing; run the command "
                 "again to compute them."
             ) from error
 
     def _set_aside(self, path: Path) -> None:
-        self._held.pop(path.name, None)
+        self._blocks.pop(path.name, None)
         self.damaged.append(path)
         with files.writing(path):
             os.replace(path, path.with_suffix(".damaged"))
@@ -162,12 +163,12 @@ def _opened(path: Path) -> Iterator[Any]:
         yield arrays
 
 
-def _header(path: Path) -> Held | None:
+def _header(path: Path) -> Stored | None:
     """Return what a file holds; None if it is damaged."""
     try:
         with _opened(path) as file:
             points, seeds, arrays = json.loads(str(file[_ABOUT]))
             is_whole = set(file.files) == {_ABOUT, *arrays}
-        return Held(path, tuple(points), tuple(seeds), tuple(arrays)) if is_whole else None
+        return Stored(path, tuple(points), tuple(seeds), tuple(arrays)) if is_whole else None
     except Exception:  # zipfile, zlib and NumPy raise many kinds
         return None

@@ -20,7 +20,15 @@ from taichi_ants.errors import AntsError, count, shown
 from taichi_ants.features import COLONY, LONE
 from taichi_ants.studies.executors import completed
 from taichi_ants.studies.plugins import Code
-from taichi_ants.studies.points import ColonyPoint, Drawn, Point, Progress, facts_of, key_of
+from taichi_ants.studies.points import (
+    ColonyPoint,
+    Drawn,
+    Point,
+    Progress,
+    chain,
+    columns_of,
+    key_of,
+)
 from taichi_ants.studies.store import Arrays, Store, parts_of
 
 Q_VALUES = "q_values"
@@ -66,35 +74,35 @@ class Study:
         object.__setattr__(self, "arrays", tuple(self.arrays))
         if not self.points:
             raise AntsError("`points` is empty; give at least one point.")
-        of_colony = isinstance(self.points[0], ColonyPoint)
-        for world, pool, ants in {(one.world, one.pool, one.ants): 0 for one in self.points}:
-            several: Any = map(world.of, self.seeds) if isinstance(world, Drawn) else [world]
-            starts = [*zip(several, self.seeds, strict=False), *((one, 0) for one in pool or ())]
-            for one, seed in starts:
-                who = ("a colony", COLONY) if of_colony else ("a run of one ant", LONE)
-                arguments.checked_world(one, True, *who).start(seed, ants)
+        is_colony = isinstance(self.points[0], ColonyPoint)
+        who = ("a colony", COLONY) if is_colony else ("a run of one ant", LONE)
+        for world, pool, ants in dict.fromkeys((p.world, p.pool, p.ants) for p in self.points):
+            worlds: Any = map(world.of, self.seeds) if isinstance(world, Drawn) else [world]
+            starts = [*zip(worlds, self.seeds, strict=False), *((drawn, 0) for drawn in pool or ())]
+            for drawn, seed in starts:
+                arguments.checked_world(drawn, True, *who).start(seed, ants)
 
     @cached_property
     def keys(self) -> tuple[str, ...]:
         """The keys of the points; equal keys and seeds mean equal outcomes."""
-        return tuple(key_of(one, *self.salt) for one in self.points)
+        return tuple(key_of(point, *self.salt) for point in self.points)
 
     @cached_property
     def seconds(self) -> np.ndarray:
         """The approximate time of each run on one processor, float64 (points, seeds)."""
-        several = np.array([[one.seconds] for one in self.points])
-        return np.broadcast_to(several, (len(self.points), len(self.seeds)))
+        of_points = np.array([[point.seconds] for point in self.points])
+        return np.broadcast_to(of_points, (len(self.points), len(self.seeds)))
 
     @cached_property
     def families(self) -> tuple[int, ...]:
         """A number for each point, equal for points that learn from the same first point."""
-        roots = [_root(one) for one in self.points]
+        roots = [chain(point)[0] for point in self.points]
         return tuple(map(list(dict.fromkeys(roots)).index, roots))
 
     @cached_property
     def first(self) -> Study | None:
         """The study of the points `after` which others learn, if there are any."""
-        points = dict.fromkeys(one.after for one in self.points if one.after is not None)
+        points = dict.fromkeys(p.after for p in self.points if p.after is not None)
         arrays = tuple(dict.fromkeys((*self.arrays, Q_VALUES)))
         return replace(self, points=tuple(points), arrays=arrays) if points else None
 
@@ -104,46 +112,33 @@ class Study:
 
     def blocks(self, runs: np.ndarray) -> Iterator[Block]:
         """Yield runs, bool (points, seeds), in blocks of points that run in one launch."""
-        places = np.flatnonzero(runs.any(axis=1)).tolist()
+        wanted = np.flatnonzero(runs.any(axis=1)).tolist()
         for _, group in itertools.groupby(
-            places, lambda place: (self.points[place].alike, runs[place].tobytes())
+            wanted, lambda p: (self.points[p].alike, runs[p].tobytes())
         ):
-            some = list(group)
-            seeds = np.flatnonzero(runs[some[0]]).tolist()
-            size = self.points[some[0]].runs_of_a_block
-            for points in _even(some, max(1, size // len(seeds))):
+            alike = list(group)
+            seeds = np.flatnonzero(runs[alike[0]]).tolist()
+            size = self.points[alike[0]].runs_of_a_block
+            for points in _even(alike, max(1, size // len(seeds))):
                 yield from (Block(points, part) for part in _even(seeds, size))
 
     def named(self, block: Block) -> str:
         """Return the settings of a block that are not those of all points, and its seeds."""
-        rows = varied(self.points)
         parts = []
-        for name in rows[0]:
-            values = [*dict.fromkeys(shown(rows[place].get(name)) for place in block.points)]
-            more = " or others" if len(values) > _NAMED else ""
-            parts.append(f"{name} {' or '.join(values[:_NAMED])}{more}")
+        for name, values in columns_of(self.points).items():
+            if any(value != values[0] for value in values):
+                texts = [*dict.fromkeys(shown(values[p]) for p in block.points)]
+                more = " or others" if len(texts) > _NAMED else ""
+                parts.append(f"{name} {' or '.join(texts[:_NAMED])}{more}")
         seeds = [self.seeds[s] for s in block.seeds]
         of_seeds = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
         return ", ".join([*parts, of_seeds])
 
 
-def _root(point: Any) -> Any:
-    return point if point.after is None else _root(point.after)
-
-
-def _even(several: list[int], most: int) -> Iterator[tuple[int, ...]]:
+def _even(indices: list[int], most: int) -> Iterator[tuple[int, ...]]:
     """Yield parts of nearly equal length, each of at most `most`."""
-    parts = np.array_split(several, -(-len(several) // most))
+    parts = np.array_split(indices, -(-len(indices) // most))
     return (tuple(part.tolist()) for part in parts)
-
-
-def varied(points: Sequence[Point]) -> list[dict[str, Any]]:
-    """Return the settings of each point that are not equal for all; worlds by numbers."""
-    numbers: dict[Any, int] = {}
-    rows = [facts_of(p, lambda name, of: numbers.setdefault(of, len(numbers))) for p in points]
-    names = dict.fromkeys(name for row in rows for name in row)
-    differ = [n for n in names if any(row.get(n) != rows[0].get(n) for row in rows)]
-    return [{name: row.get(name) for name in differ} for row in rows]
 
 
 def share_of(seconds: np.ndarray, families: Sequence[int], number: int, shards: int) -> np.ndarray:
@@ -160,18 +155,18 @@ def share_of(seconds: np.ndarray, families: Sequence[int], number: int, shards: 
 
 
 class FailedBlocksError(AntsError):
-    """Blocks that cannot be computed, while others are finished; `several` names them all."""
+    """Blocks that cannot be computed, while others are finished; `blocks` names them all."""
 
     exit_status = 1
 
-    def __init__(self, several: Sequence[str]) -> None:
-        more = f" and {len(several) - _NAMED} more" if len(several) > _NAMED else ""
+    def __init__(self, blocks: Sequence[str]) -> None:
+        more = f" and {len(blocks) - _NAMED} more" if len(blocks) > _NAMED else ""
         super().__init__(
-            f"{count(len(several), 'block')} failed: {'; '.join(several[:_NAMED])}{more}; all "
-            "others are saved, so correct the cause and run the same command again, or with "
-            "another --out if you change a plugin."
+            f"{count(len(blocks), 'block')} failed: {'; '.join(blocks[:_NAMED])}{more}; all others "
+            "are saved, so correct the cause and run the same command again, or with another --out "
+            "if you change a plugin."
         )
-        self.several = list(several)
+        self.blocks = list(blocks)
 
 
 def run(
@@ -200,7 +195,7 @@ def run(
     """
     mine = share_of(study.seconds, study.families, *shard)
     stages = list(_stages(study, store, mine & study.missing(store)))
-    left = sum(one.seconds[runs].sum() for one, runs in stages)
+    left = sum(stage.seconds[runs].sum() for stage, runs in stages)
     total = left + study.seconds[mine & ~study.missing(store)].sum()
     failed: list[str] = []
 
@@ -208,19 +203,22 @@ def run(
         progress(1.0 - max(0.0, left - more) / max(total, 1e-9))
 
     show()
-    for number, (one, runs) in enumerate(stages):
-        work = partial(_work, one, store, where, None if executor else show)
-        wanted = runs & one.missing(store)  # the stage before has computed some of them
-        left = one.seconds[wanted].sum() + sum(s.seconds[r].sum() for s, r in stages[number + 1 :])
-        for block, outcome in completed(list(one.blocks(wanted)), work, executor, code):
+    for number, (stage, runs) in enumerate(stages):
+        work = partial(_work, stage, store, where, None if executor else show)
+        wanted = runs & stage.missing(store)  # the stage before has computed some of them
+        later = stages[number + 1 :]
+        left = stage.seconds[wanted].sum() + sum(s.seconds[r].sum() for s, r in later)
+        for block, outcome in completed(list(stage.blocks(wanted)), work, executor, code):
             if isinstance(outcome, Exception):
-                failed.append(f"{one.named(block)} ({_said(outcome)})")
+                text = " ".join(str(outcome).split()).rstrip(".")
+                kind = "" if isinstance(outcome, AntsError) else f"{type(outcome).__name__}: "
+                failed.append(f"{stage.named(block)} ({kind}{text})")
                 if len(failed) == _HOPELESS and not (mine & ~study.missing(store)).any():
                     break
                 continue
-            keys, seeds = [one.keys[p] for p in block.points], [one.seeds[s] for s in block.seeds]
-            store.add(keys, seeds, outcome)
-            left -= one.seconds[np.ix_(*block)].sum()
+            keys = [stage.keys[p] for p in block.points]
+            store.add(keys, [stage.seeds[s] for s in block.seeds], outcome)
+            left -= stage.seconds[np.ix_(*block)].sum()
             show()
         if failed:
             raise FailedBlocksError(failed)
@@ -265,15 +263,9 @@ def outcome_of(
 
     `learned` are the tables of the point `after`, float32 (seeds, n_states, 5), or None.
     """
-    found = points[0].do(points, seeds, learned, progress or (lambda share: None), where)
-    found = {**found, **(measure(points, seeds, found) if measure else {})}
+    outcome = points[0].do(points, seeds, learned, progress or (lambda share: None), where)
+    outcome = {**outcome, **(measure(points, seeds, outcome) if measure else {})}
     for name in arrays:
-        if not parts_of(name, found):
-            raise AntsError(f"runs have no {name!r}; choose others of {', '.join(found)}")
-    return {part: found[part] for name in arrays for part in parts_of(name, found)}
-
-
-def _said(error: Exception) -> str:
-    """Return an error as messages show it."""
-    text = " ".join(str(error).split()).rstrip(".")
-    return text if isinstance(error, AntsError) else f"{type(error).__name__}: {text}"
+        if not parts_of(name, outcome):
+            raise AntsError(f"runs have no {name!r}; choose others of {', '.join(outcome)}")
+    return {part: outcome[part] for name in arrays for part in parts_of(name, outcome)}

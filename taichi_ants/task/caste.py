@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from numbers import Real
 from typing import Annotated, Any, Literal, get_args
 
@@ -49,8 +49,7 @@ class Threshold(Settings, path="task.castes.NAME.threshold"):
         Setting(only=("distribution", *DISTRIBUTIONS[2:])),
     ] = None
 
-    def faults(self) -> Iterator[str]:
-        """Yield messages about combinations of values that are not allowed."""
+    def _faults(self) -> Iterator[str]:
         value, spread = self.value or 0.0, self.spread or 0.0
         if self.distribution == "uniform" and spread > value:
             yield (
@@ -135,12 +134,9 @@ class Caste(Settings, path="task.castes.NAME"):
         str | None, Setting("what ants with food see as S; off: the cue of the task")
     ] = None
     lifespan: Annotated[Ticks, Setting("age at which an ant dies; off: that of the task")] = None
-    threshold: Annotated[Threshold, Setting("response thresholds of the ants")] = field(
-        default_factory=Threshold
-    )
+    threshold: Annotated[Threshold, Setting("response thresholds of the ants")] = Threshold()
 
-    def faults(self) -> Iterator[str]:
-        """Yield messages about combinations of values that are not allowed."""
+    def _faults(self) -> Iterator[str]:
         path, spread, epsilon = self.path, self.epsilon_spread, self.epsilon
         if self.share is not None and self.ants is not None:
             yield f"`{path}.ants` is {self.ants}, but `share` is {self.share}; give one of them."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Literal, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import BUILT_IN, Rule
@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
 Own = TypeVar("Own", bound="Pheromone")
 View = Literal["half", "strongest", "strongest_under_carriers"]
-EVAPORATIONS, DEPOSITS = BUILT_IN["evaporation"], BUILT_IN["deposit"]
-VIEWS: tuple[str, ...] = get_args(View)
+DEPOSITS = BUILT_IN["deposit"]
 MAX_DEPOSIT = 1_000_000
 LINEAR = -1.0  # marks linear evaporation in place of a decay factor
 

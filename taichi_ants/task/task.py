@@ -7,13 +7,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache, partial
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 from taichi_ants.errors import shown
 from taichi_ants.rules.inputs import LABOUR
 from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import Parameters, Rule
-from taichi_ants.settings import Named, Setting, Settings
+from taichi_ants.settings import Named, Setting, Settings, declared
 from taichi_ants.task import observations
 from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
 from taichi_ants.task.choice import Choice, Noise
@@ -25,7 +25,13 @@ from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
 
 Delivery = Literal["terminates", "truncates"]
-DELIVERIES: tuple[str, ...] = get_args(Delivery)
+# Settings of castes that need a table of action values, or certain rules of choice.
+_OF_TABLES = ("policy", "epsilon", "epsilon_spread", "learning_rate", "discount")
+_OF_CHOICE = {
+    setting.name: setting.rule.only[1:]
+    for setting in declared(Choice)
+    if setting.rule.only and setting.name in Caste.__dataclass_fields__
+}
 _CUES = {"outbound_cue": (), "homing_cue": (COMPASS,)}  # with cues that are not pheromones
 
 
@@ -59,8 +65,7 @@ class Traffic(Settings, path="task.traffic"):
         ),
     ] = False
 
-    def faults(self) -> Iterator[str]:
-        """Yield messages about combinations of values that are not allowed."""
+    def _faults(self) -> Iterator[str]:
         if self.carriers_first and not self.shared:
             yield (
                 "`task.traffic.carriers_first` is True; leave it out unless `swap` or `follow` is "
@@ -121,10 +126,10 @@ class Task(Settings, path="task"):
     observation: Annotated[str, Setting("observation of an ant", choices=observations.names)] = (
         "paper"
     )
-    rewards: Annotated[Rewards, Setting("reward of each event")] = field(default_factory=Rewards)
+    rewards: Annotated[Rewards, Setting("reward of each event")] = Rewards()
     pheromone: Annotated[
         Pheromone, Setting("rules by which trails are laid, evaporate and spread")
-    ] = field(default_factory=Pheromone)
+    ] = Pheromone()
     fields: Annotated[Named[Field], Setting("further pheromones, by name")] = field(
         default_factory=Named
     )
@@ -137,9 +142,7 @@ class Task(Settings, path="task"):
             "what ants with food see as S: compass (nearer cells), trail, or the name of a field"
         ),
     ] = COMPASS
-    traffic: Annotated[Traffic, Setting("rules for entering a cell with an ant on it")] = field(
-        default_factory=Traffic
-    )
+    traffic: Annotated[Traffic, Setting("rules for entering a cell with an ant on it")] = Traffic()
     turns_at_queen: Annotated[bool, Setting("turn ants around after a delivery")] = False
     delivery: Annotated[
         Delivery,
@@ -152,15 +155,9 @@ class Task(Settings, path="task"):
     evaporation_in_evaluation: Annotated[
         bool, Setting("evaporate trails while ants follow a fixed policy")
     ] = True
-    life: Annotated[Life, Setting("changes of ants and food in colonies")] = field(
-        default_factory=Life
-    )
-    choice: Annotated[Choice, Setting("rule by which ants choose actions")] = field(
-        default_factory=Choice
-    )
-    noise: Annotated[Noise, Setting("failures of actions and observations")] = field(
-        default_factory=Noise
-    )
+    life: Annotated[Life, Setting("changes of ants and food in colonies")] = Life()
+    choice: Annotated[Choice, Setting("rule by which ants choose actions")] = Choice()
+    noise: Annotated[Noise, Setting("failures of actions and observations")] = Noise()
     foods: Annotated[
         Named[Food],
         Setting("kinds of food, in the order of their numbers in worlds; colonies only"),
@@ -168,9 +165,7 @@ class Task(Settings, path="task"):
     castes: Annotated[
         Named[Caste], Setting("castes of ants, in the order of their numbers; colonies only")
     ] = field(default_factory=Named)
-    labour: Annotated[Labour, Setting("rule by which ants start and stop foraging")] = field(
-        default_factory=Labour
-    )
+    labour: Annotated[Labour, Setting("rule by which ants start and stop foraging")] = Labour()
     reward: Annotated[
         str,
         Setting(
@@ -189,8 +184,7 @@ class Task(Settings, path="task"):
         others = {name: self.rules[name] for name in self.rules if name not in used}
         object.__setattr__(self, "rules", Named({**used, **others}))
 
-    def faults(self) -> Iterator[str]:
-        """Yield messages about combinations of values that are not allowed."""
+    def _faults(self) -> Iterator[str]:
         choice, life, labour = self.choice, self.life, self.labour
         without_states = choice.rule == "deneubourg" or (choice.own_rule and self.noise.misread)
         if without_states and self.observation != "paper":
@@ -236,7 +230,8 @@ class Task(Settings, path="task"):
         nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
         for nest in (nests or {0}) if self.castes else ():
             shares_in(self.castes, nest)  # raises AntsError
-        unused = self._unused_of_castes
+        unused = [] if choice.needs_table else [*_OF_TABLES]
+        unused += [name for name, rules in _OF_CHOICE.items() if choice.rule not in rules]
         for name, caste in self.castes.items():
             if caste.threshold.exists and not labour.divides:
                 yield (
@@ -294,9 +289,10 @@ class Task(Settings, path="task"):
 
     def replace(self, /, **changes: Any) -> Task:
         """Return the task with changes; rules that it no longer uses lose their parameters."""
-        bare = copy.copy(self)
-        object.__setattr__(bare, "rules", Named())
-        parameters = changes.pop("rules", {})
+        bare, parameters = self, changes.pop("rules", {})
+        if self.rules:
+            bare = copy.copy(self)
+            object.__setattr__(bare, "rules", Named())
         task = super(Task, bare).replace(**changes)
         kept = {name: self.rules.get(name, default) for name, default in task.rules.items()}
         object.__setattr__(task, "rules", Named(kept))
@@ -318,19 +314,6 @@ class Task(Settings, path="task"):
         """Whether ants are born or die."""
         spans = [self.life.lifespan, *(caste.lifespan for caste in self.castes.values())]
         return self.life.births or any(span is not None for span in spans)
-
-    @property
-    def _unused_of_castes(self) -> set[str]:
-        """The settings of castes that the rule of choice does not use."""
-        learning = ("policy", "epsilon", "epsilon_spread", "learning_rate", "discount")
-        rules = {
-            "greedy": learning,
-            "softmax": (*learning, "temperature"),
-            "deneubourg": ("k", "exponent"),
-        }
-        usual = rules["greedy"] if self.choice.needs_table else ()  # for your own rules
-        used = rules.get(self.choice.rule, usual)
-        return {name for of_rule in rules.values() for name in of_rule}.difference(used)
 
     def cues_of(self, caste: Caste | None) -> tuple[int, int]:
         """Return the numbers of the outbound and the homing cue of a caste, or of the task."""

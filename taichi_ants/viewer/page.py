@@ -12,7 +12,7 @@ from typing import Any
 
 from taichi_ants import files
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.runs.traces import Trace
+from taichi_ants.engines.runs.results import Trace
 from taichi_ants.errors import expect
 from taichi_ants.rendering.snapshots import picture
 from taichi_ants.rendering.writers import check_file, png, write

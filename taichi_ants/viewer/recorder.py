@@ -13,7 +13,7 @@ import numpy as np
 
 from taichi_ants import learners
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.runs.traces import Trace
+from taichi_ants.engines.runs.results import Trace
 from taichi_ants.errors import AntsError, check_one_of, count, expect
 from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import colony_of_rollout, intervals

@@ -24,7 +24,7 @@ from taichi_ants.worlds.world import World
 
 ROOM_RADIUS = 5  # radius of the rooms around queen and food, with space for 90 ants and the queen
 PILE_RADIUS = 3  # radius of the pile of food, which has 37 cells
-MIN_STEPS, MAX_STEPS = 4, 1000  # bounds of the length of the short branch
+MIN_STEPS, MAX_STEPS = 4, 500  # bounds of the length of the short branch
 _NEST_JUNCTION = ROOM_RADIUS + 1  # x coordinate; the queen is at the origin
 _BULGE = 3  # preferred number of steps of the short branch to the side
 

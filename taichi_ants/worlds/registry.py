@@ -24,9 +24,7 @@ BUILT_IN: dict[str, Builder] = {
     "open": open_world,
     "paper": paper,
 }
-WORLDS: Registry[Builder] = Registry(
-    "world", "taichi_ants.worlds.register", BUILT_IN, any_text=True
-)
+WORLDS: Registry[Builder] = Registry("world", "taichi_ants.worlds.register", BUILT_IN)
 names = WORLDS.names
 
 
@@ -35,7 +33,7 @@ def register(name: str, builder: Builder) -> None:
 
     The builder is called with the settings of the world as keywords and returns a `World`. All its
     arguments except `seed` need defaults. A builder with an argument `seed` gets a whole number and
-    must return the same world for the same number. Raises AntsError if the name is not text or
+    must return the same world for the same number. Raises AntsError if the name is not a word or
     belongs to a built-in world, or if an argument has no default.
     """
     WORLDS.check_new(name)

@@ -102,10 +102,10 @@ def from_text(text: str, source: str = "the map") -> World:
     )
 
 
-def ranges_of(text: str, source: str = "the map") -> tuple[int, int, int]:
+def ranges_of(text: str) -> tuple[int, int, int]:
     """Return the ranges of the world drawn in `text`, without building it."""
-    *_, drawn = _read(text, source)
-    return _placed(drawn, source)[0]
+    *_, drawn = _read(text, "the map")
+    return _placed(drawn, "the map")[0]
 
 
 class _Character(NamedTuple):
@@ -241,7 +241,7 @@ def to_text(world: World) -> str:
         ("a trail under the queen or food", bool(hidden)),
     ):
         if is_there:
-            raise AntsError(f"a map cannot show {what}; remove it from the world.")
+            raise AntsError(f"a map cannot show {what}; change this in the world.")
     marks = [(world.grid.cells(np.flatnonzero(world.grid.exists)), EMPTY)]
     kinds = world.kinds_by_cell()[world.grid.index(world.foods)]
     marks += [(world.obstacles, OBSTACLE)]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,7 @@ _PARTS = ("foods", "obstacles", "trails", "ants")
 _MORE = ("food_kinds", "other_queens")  # empty in a world with one nest and one kind of food
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class World:
     """A world of hexagonal cells at the start of an episode.
 
@@ -57,47 +57,39 @@ class World:
 
     ranges: tuple[int, int, int]
     queen: tuple[int, int, int]
-    foods: np.ndarray = ()  # type: ignore[assignment]
-    obstacles: np.ndarray = ()  # type: ignore[assignment]
-    trails: np.ndarray = ()  # type: ignore[assignment]
-    ants: np.ndarray = ()  # type: ignore[assignment]
-    food_kinds: np.ndarray = ()  # type: ignore[assignment]
-    other_queens: np.ndarray = ()  # type: ignore[assignment]
-    regions: Mapping[str, np.ndarray] = field(default_factory=dict)
+    foods: np.ndarray
+    obstacles: np.ndarray
+    trails: np.ndarray
+    ants: np.ndarray
+    food_kinds: np.ndarray
+    other_queens: np.ndarray
+    regions: Mapping[str, np.ndarray]
 
-    if TYPE_CHECKING:  # arguments may be any sequences, but attributes are arrays
-
-        def __init__(
-            self,
-            ranges: Sequence[int],
-            queen: Sequence[int] | Sequence[Sequence[int]],
-            foods: npt.ArrayLike = (),
-            obstacles: npt.ArrayLike = (),
-            trails: npt.ArrayLike = (),
-            ants: npt.ArrayLike = (),
-            food_kinds: npt.ArrayLike = (),
-            other_queens: npt.ArrayLike = (),
-            regions: Mapping[str, Any] = ...,
-        ) -> None: ...
-
-    def __post_init__(self) -> None:
-        ranges = validation.parse_ranges(self.ranges)
-        grid = AxialGrid(ranges)
-        queens: Any = self.queen
-        if len(self.other_queens):
-            queens = [self.queen, *np.asarray(self.other_queens).tolist()]
+    def __init__(
+        self,
+        ranges: Sequence[int],
+        queen: Sequence[int] | Sequence[Sequence[int]],
+        foods: npt.ArrayLike = (),
+        obstacles: npt.ArrayLike = (),
+        trails: npt.ArrayLike = (),
+        ants: npt.ArrayLike = (),
+        food_kinds: npt.ArrayLike = (),
+        other_queens: npt.ArrayLike = (),
+        regions: Mapping[str, Any] | None = None,
+    ) -> None:
+        others = np.asarray(other_queens).tolist()
+        grid = AxialGrid(validation.parse_ranges(ranges))
         contents: dict[str, Any] = validation.parse_contents(
-            grid, queens, self.foods, self.food_kinds, self.obstacles, self.trails, self.ants
+            grid, [queen, *others] if others else queen, foods, food_kinds, obstacles, trails, ants
         )
         queens = contents.pop("queens")
-        contents |= {"queen": tuple(queens[0].tolist()), "other_queens": queens[1:]}
         if not contents["food_kinds"].any():
             contents["food_kinds"] = contents["food_kinds"][:0]
-        # The dataclass is frozen; only this code sets its fields.
-        object.__setattr__(self, "ranges", ranges)
-        object.__setattr__(self, "regions", validation.parse_regions(grid, self.regions))
+        contents |= {"ranges": grid.ranges, "queen": tuple(queens[0].tolist())}
+        contents |= {"other_queens": queens[1:]}
+        contents["regions"] = validation.parse_regions(grid, {} if regions is None else regions)
         for name, value in contents.items():
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, value)  # the dataclass is frozen
 
     @cached_property
     def grid(self) -> AxialGrid:

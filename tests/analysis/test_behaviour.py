@@ -17,7 +17,7 @@ from taichi_ants.analysis.behaviour import (
     WALKS,
     classify,
 )
-from taichi_ants.engines.runs.traces import trace_policies
+from taichi_ants.engines.runs.training import trace_policies
 from taichi_ants.learners import policies
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT, SEES_CUE
 from taichi_ants.task.states import state_from_index

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 import shutil
-import stat
 import zipfile
 from pathlib import Path
 
 import pytest
 from command_lines import ROOT, assert_one_sentence, assert_same_results, call, contents
 
+from taichi_ants import commands
 from taichi_ants.studies import archive
-from taichi_ants.studies.folder import asked_in, checksum_of, manifest_in, write_json
+from taichi_ants.studies.folder import asked_in, checksum_of, json_in, write_json
 
 PLUGIN = """
 from pathlib import Path
@@ -65,7 +65,7 @@ def study(tmp_path_factory):
             "archive": ["done", "--out", "done.zip"],
         }.items():
             with pytest.raises(SystemExit) as exit_:
-                __import__(f"taichi_ants.commands.{name}", fromlist=["main"]).main(arguments)
+                commands.run(name, arguments)
             assert exit_.value.code == 0
         for path in ("old", "my.toml", "ran"):
             shutil.rmtree(path) if Path(path).is_dir() else Path(path).unlink()
@@ -94,7 +94,7 @@ def test_an_archive_has_the_folder_and_all_that_repeats_the_study(here):
         lock = found.read("requirements.txt").decode()
     inputs = ("my.toml", "plugin/my_plugin.py", "plugin/ants_halved.py", "rule.npz", "garden.txt")
     assert {f"results/inputs/{name}" for name in inputs} <= {*own}
-    manifest = manifest_in(here / "done")
+    manifest = json_in(here / "done" / "manifest.json")
     assert {"taichi", "numpy", "kiwisolver", "taichi_ants"} <= manifest["packages"].keys()
     assert f"numpy=={manifest['packages']['numpy']}\n" in lock
     assert f"# Python {manifest['python']}\n" in lock
@@ -113,15 +113,15 @@ def test_equal_results_give_equal_archives(here, capsys):
 
 def test_an_archive_repeats_itself_without_the_files_that_the_study_read(here, capsys):
     err = refused("reproduce", [here / "done.zip"], capsys)
-    assert "results/inputs/plugin/my_plugin.py (SHA-256 " in err
-    assert "results/inputs/plugin/ants_halved.py (SHA-256 " in err
+    assert "results/inputs/plugin/my_plugin.py; read it" in err
+    assert "results/inputs/plugin/ants_halved.py, " in err
     assert "give --trust-code to run it" in err
     assert not list(Path().iterdir())
     status, out, err = call("reproduce", [here / "done.zip", "--trust-code"], capsys)
     assert status == 0
     assert err.startswith("Running code of the archive: results/inputs/plugin/")
     *lines, verdict = out.splitlines()
-    names = sorted(manifest_in(here / "done")["files"])
+    names = sorted(json_in(here / "done" / "manifest.json")["files"])
     assert [line.split()[1] for line in lines] == names
     assert all(line.startswith("equal  ") for line in lines)
     assert verdict == f"All {len(names)} files are equal: the study is reproduced."
@@ -140,7 +140,7 @@ def copy(here):
 def rewrite(copy, name, change):
     """Change a file of results and its checksum."""
     (copy / name).write_text(change((copy / name).read_text()))
-    manifest = manifest_in(copy)
+    manifest = json_in(copy / "manifest.json")
     manifest["files"][name] = checksum_of(copy / name)
     write_json(copy / "manifest.json", manifest)
 
@@ -155,7 +155,7 @@ def test_a_difference_is_named_with_its_place(copy, capsys, monkeypatch):
     monkeypatch.setattr(archive, "packages", lambda: {**known, "numpy": "0", "scipy": None})
     status, out, err = call("reproduce", ["copy.zip", "--trust-code"], capsys)
     assert status == 1
-    assert f"DIFFERENT  runs.csv (first difference at byte {at}, line 2)" in out
+    assert "DIFFERENT  runs.csv (first difference in line 2)" in out
     assert "DIFFERENT  more.txt (is only in the archive)" in out
     assert "2 of 4 files differ: the study is not reproduced.\n" in out
     versions = f"numpy 0 instead of {known['numpy']}, scipy None instead of {known['scipy']}"
@@ -175,11 +175,13 @@ def test_a_difference_is_named_with_its_place(copy, capsys, monkeypatch):
 def test_folders_that_cannot_be_archived(change, copy, capsys):
     change(copy)
     err = refused("archive", ["copy"], capsys)
-    assert re.search("has no finished results, or some of them have changed; run|is damaged", err)
+    assert re.search(
+        "has no finished results, or some of them have changed; run|is damaged|has no results", err
+    )
     assert not Path("copy.zip").exists()
 
 
-def changed(source, name, more=(), drops=(), mode=None):
+def changed(source, name, more=(), drops=()):
     """Write an archive with other files to `name`, with the same index."""
     with zipfile.ZipFile(source) as old, zipfile.ZipFile(name, "w", zipfile.ZIP_DEFLATED) as new:
         for one in old.infolist():
@@ -187,7 +189,7 @@ def changed(source, name, more=(), drops=(), mode=None):
                 new.writestr(one, old.read(one))
         for path, content in more:
             entry = zipfile.ZipInfo(path)
-            entry.external_attr, entry.compress_type = (mode or 0) << 16, zipfile.ZIP_DEFLATED
+            entry.compress_type = zipfile.ZIP_DEFLATED
             new.writestr(entry, content)
 
 
@@ -198,9 +200,6 @@ def test_bad_archives_are_refused_and_leave_nothing(here, capsys, monkeypatch):
     Path("end.zip").write_bytes(content[:-100])
     Path("flipped.zip").write_bytes(content[:1000] + bytes([content[1000] ^ 4]) + content[1001:])
     changed(good, "slip.zip", [("../evil.py", "")])
-    changed(good, "absolute.zip", [("/tmp/evil.py", "")])
-    changed(good, "windows.zip", [("C:\\evil.py", "")])
-    changed(good, "link.zip", [("link", "/etc/passwd")], mode=stat.S_IFLNK | 0o777)
     changed(good, "less.zip", drops=["results/runs.csv"])
     changed(good, "other.zip", [("results/runs.csv", "0")], drops=["results/runs.csv"])
     changed(good, "plain.zip", drops=["results/study.json"])
@@ -208,12 +207,13 @@ def test_bad_archives_are_refused_and_leave_nothing(here, capsys, monkeypatch):
     for name, words in {
         "nothing.zip": "no such file",
         **dict.fromkeys(("text.zip", "end.zip", "flipped.zip"), "or it is damaged ("),
-        **dict.fromkeys(("slip.zip", "absolute.zip", "windows.zip"), "it contains the odd file '"),
-        "link.zip": "it contains the odd file 'link'",
-        **dict.fromkeys(("less.zip", "other.zip", "plain.zip"), "has no finished results, or some"),
+        **dict.fromkeys(("less.zip", "other.zip"), "has no finished results, or some"),
+        "plain.zip": "has no results",
     }.items():
         assert words in refused("reproduce", [name, "--trust-code"], capsys), name
         assert {*Path().iterdir()} == before
+    with archive.unpacked(Path("slip.zip")) as place:  # nothing lands outside of the folder
+        assert not (place.parents[1] / "evil.py").exists()
     monkeypatch.setattr(archive, "MOST_BYTES", 3 * len(content))
     changed(good, "bomb.zip", [("results/zeros", bytes(4 * len(content)))])
     assert Path("bomb.zip").stat().st_size < 2 * len(content)

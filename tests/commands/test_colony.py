@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,9 +23,8 @@ from command_lines import (
 
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
 from taichi_ants.commands import colony as command
-from taichi_ants.learners import registry
 from taichi_ants.learners.policies import save_policy
-from taichi_ants.task import Traffic, foraging, paper, queueing
+from taichi_ants.task import foraging, paper, queueing
 
 CALM = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
 
@@ -39,75 +37,24 @@ def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        ([], "live"),
-        (["play"], "invalid choice: 'play'"),
-        (["--ants", 2], "invalid choice: '2'"),
         (["live", "--quick"], "unrecognized arguments: --quick"),
-        (
-            ["live", "--resume", "x", "--task.life.regrowth", 0],
-            "--task.life.regrowth cannot change a resumed",
-        ),
-        (
-            ["live", "--resume", "x", "--training.discount", 0.5],
-            "--training.discount cannot change a resumed colony",
-        ),
-        (["live", "--resume", "x", "--seed", 0], "--seed cannot change a resumed colony"),
-        (
-            ["live", "--resume", "x", "--training.learner", "sarsa"],
-            "--training.learner cannot change a resumed colony",
-        ),
         (
             ["live", "--resume", "x", "--task.life.births"],
             "--task.life.births cannot change a resumed colony",
-        ),
-        (["live", "--resume", "x", "--task", "paper"], "--task cannot change a resumed"),
-        (
-            ["live", "--task.pheromone.deposit", "none", "--task.pheromone.level", 3],
-            "`task.pheromone.level` is 3; leave it out",
         ),
         (
             ["live", "--sharing", "frozen", "--training.discount", 0.9],
             "--training.discount has no effect with",
         ),
-        (
-            ["live", "--frame-interval", 2],
-            "--frame-interval requires an animation, but --render is missing; name a .gif",
-        ),
-        (
-            ["live", "--render", "a.PNG", "--frame-interval", 2],
-            "--frame-interval requires an animation, but --render is a.PNG",
-        ),
-        (
-            ["live", "--task.pheromone.cap", 5],
-            "`task.pheromone.cap` is 5; leave it out unless `deposit` is 'add'",
-        ),
-        (
-            ["live", "--task", "paper", "--task.pheromone.slope", 5],
-            "`task.pheromone.slope` is 5; leave it out",
-        ),
-        (
-            ["live", "--task", "foraging", "--task.pheromone.cap", 5],
-            "`task.pheromone.cap` is 5; leave it out",
-        ),
-        (["live", "--task", "running"], "invalid choice: 'running'"),
         (["live", "--figure", "a.gif"], "'a.gif' cannot hold one picture"),
-        (["live", "--figure", "/proc/x/a.png"], "cannot write '/proc/x/a.png'"),
         (["live", "--resume", "x"], "cannot read 'x'"),
-        (["live", "--ants", 0], "0 is not allowed"),
-        (["live", "--ants", 500, "--world.ranges", 10, 10, 10], "the number of ants is 500"),
-        (
-            ["live", "--world", "paper", "--world.ranges", 9, 9, 9],
-            "`world.ranges` is not a setting of the world 'paper'",
-        ),
         (["live", "--world", "nowhere"], "there is no world 'nowhere'"),
         (
             ["live", "--task.life.births", "--capacity", 5],
             "capacity is 5; it must lie between 80 and",
         ),
-        (["live", "--render", "x.bmp"], "'x.bmp' ends in '.bmp'"),
         (["live", "--save", "/proc/x/y"], "cannot write '/proc/x/y'"),
         (["live", "--save", "."], "'.' is not a regular file"),
-        (["live", "--save", ""], "--save is empty"),
         # Told before what comes later, as the work does.
         (["live", "--save", "/dev/null", "--resume", "x"], "'/dev/null' is not a regular file"),
         (["live", "--render", "../a.png/", "--resume", "x"], "'../a.png/' is not a regular file"),
@@ -116,40 +63,18 @@ def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are
             "'.' already exists and is not an empty folder",
         ),
         (
-            ["live", "--task.pheromone.diffusion", 2],
-            "`task.pheromone.diffusion` is 2; it must be between 0 and 1",
-        ),
-        (
-            ["live", "--task.pheromone.half-life", 5, "--task.pheromone.evaporation", "none"],
-            "`task.pheromone.half_life` is 5.0; leave it out",
-        ),
-        (
-            ["live", "--sharing", "frozen"],
-            "--sharing frozen requires a policy; add --policy FILE",
-        ),
-        (
             [
                 *("live", "--task", "paper", "--task.choice.rule", "deneubourg"),
                 *("--training.discount", 0.5),
             ],
             "--task.choice.rule is deneubourg, by which ants choose without learning",
         ),
-        (["live", "--policy", "x.npz"], "cannot read 'x.npz'"),
         (
             ["live", "--policy", "x", "--task.observation", "paper"],
-            "--task.observation has no effect with --policy",
-        ),
-        (
-            ["live", "--task.observation", "nose"],
-            "`task.observation` is 'nose'; it must be one of paper",
-        ),
-        (
-            ["live", "--training.epsilon", "much"],
-            "`training.epsilon` is 'much'; it must be a number",
+            "the file of --policy determines the observation",
         ),
         (["live", "--task.pheromone.half-live", 5], "is not a setting; choose half_life"),
         (["live", "--task.life.births", "maybe"], "is 'maybe'; it must be True or False"),
-        (["live", "--training.x", "1"], "`training.x` is not a setting of sarsa"),
         (["live", "--plugin", "x.py"], "cannot read the plugin"),
     ],
 )
@@ -160,42 +85,6 @@ def test_mistakes_end_in_one_sentence(arguments, expected, capsys, tmp_path, mon
     assert_one_sentence(err)
     assert expected in err
     assert list(tmp_path.iterdir()) == []
-
-
-def test_ants_that_choose_without_a_table_need_no_policy(capsys, tmp_path):
-    rule = ["--task", "paper", "--task.choice.rule", "deneubourg", "--ants", 9]
-    file = tmp_path / "c.npz"
-    status, _, err = call("colony", ["live", *rule, "--ticks", 7, "--save", file], capsys)
-    assert (status, err) == (0, "")
-    colony = Colony.load(file)
-    assert (colony.ticks, colony.learns, colony.task.choice.rule) == (7, False, "deneubourg")
-
-
-def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(registry.LEARNERS, "yours", dict(registry.LEARNERS.yours))
-    lines = [
-        "import taichi as ti",
-        "from taichi_ants.learners import register, td_learner",
-        "@ti.func",
-        "def td_error(value, reward, discount, next_values, next_action, epsilon):",
-        "    return reward - ti.log(value - 0.5)",
-        'register(td_learner("lost", td_error))',
-    ]
-    Path("lost.py").write_text("\n".join(lines), "utf-8")
-    arguments = ["live", "--ants", 10, "--plugin", "lost.py", "--ticks", 100]
-    arguments += ["--training.learner", "lost"]
-    for more in ([], ["--save", "lost.npz"]):
-        status, out, err = call("colony", [*arguments, *more], capsys)
-        assert (status, out) == (2, "")
-        assert_one_sentence(err)
-        assert "learner 'lost' computed action values that are not finite" in err
-        monkeypatch.setattr(
-            registry.LEARNERS,
-            "yours",
-            {name: one for name, one in registry.LEARNERS.yours.items() if name != "lost"},
-        )
-    assert not Path("lost.npz").exists()
 
 
 LIFE = [
@@ -302,66 +191,12 @@ FOOD_IS_BACK = replace(queueing(), life=Life(regrowth=0))
     ("arguments", "made_for", "expected"),
     [
         ([], None, queueing()),
-        (["--task", "paper"], None, paper()),
-        (["--task", "queueing"], None, queueing()),
         ([], FOOD_IS_BACK, FOOD_IS_BACK),
-        (["--task", "queueing"], FOOD_IS_BACK, queueing()),
         (["--task", "foraging"], queueing(), replace(foraging(), observation="queues")),
         (
             ["--task.life.regrowth", 0, "--task.life.births"],
             queueing(),
             replace(queueing(), life=Life(True, None, 0)),
-        ),
-        (["--task.life.lifespan", 9], FOOD_IS_BACK, replace(queueing(), life=Life(False, 9, 0))),
-        (
-            ["--task", "foraging", "--task.pheromone.deposit", "none"],
-            None,
-            replace(foraging(), pheromone=Pheromone(deposit="none", view="strongest")),
-        ),
-        (
-            ["--task.traffic", "right_of_way"],
-            None,
-            replace(queueing(), traffic=Traffic(swap=True)),
-        ),
-        (
-            ["--task", "foraging", "--task.observation", "paper", "--task.traffic", "blocking"],
-            None,
-            Task(
-                pheromone=Pheromone(deposit="fading", level=500, view="strongest"),
-                evaporation_in_training=True,
-            ),
-        ),
-        (
-            [
-                *("--task", "paper"),
-                "--task.pheromone.deposit",
-                "fading",
-                "--task.pheromone.slope",
-                7,
-                "--task.pheromone.view",
-                "strongest",
-                "--task.pheromone.level",
-                90,
-            ],
-            None,
-            Task(pheromone=Pheromone(deposit="fading", slope=7, view="strongest", level=90)),
-        ),
-        (
-            [
-                "--task",
-                "foraging",
-                "--task.pheromone.deposit",
-                "add",
-                "--task.pheromone.evaporation",
-                "exponential",
-                "--task.pheromone.half-life",
-                20,
-            ],
-            None,
-            replace(
-                foraging(),
-                pheromone=Pheromone("exponential", 20, deposit="add", level=500, view="strongest"),
-            ),
         ),
         (
             ["--task.pheromone.evaporation", "linear"],
@@ -413,53 +248,6 @@ def test_a_figure_shows_what_all_colonies_deliver_by_tick(capsys, tmp_path, monk
         assert row["blocked"] == blocked / moves
         before = after
     assert before.deliveries.sum() > 100
-
-
-@pytest.mark.parametrize(("name", "observation"), [("foraging", "ants"), ("queueing", "queues")])
-def test_policies_are_kept_for_colonies_that_learn_nothing(name, observation):
-    path = EXPERIMENTS / "policies" / f"{name}.npz"
-    policy = load_policy(path)
-    assert policy.task.observation == policy.observation == observation
-    assert policy.task.life == Life(regrowth=0)
-    assert path.stat().st_size < 12_000
-
-
-@pytest.mark.parametrize("from_file", [True, False])
-def test_a_colony_sees_what_its_policy_or_the_option_says(from_file, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    save_policy("five.npz", np.eye(2048, 5), {}, "five_cells")
-    sees = ["--policy", "five.npz"] if from_file else ["--task.observation", "five_cells"]
-    more = ["--training.learner", "dyna_q", "--training.planning-steps", "3", "--save", "a.npz"]
-    assert call("colony", ["live", "--ants", 2, "--ticks", 9, *sees, *more], capsys)[0] == 0
-    saved = Colony.load("a.npz")
-    assert saved.task.observation == "five_cells"
-    assert saved.q_values.any()
-    assert saved.q_values.shape == (1, 2048, 5)
-    assert dict(saved.training.hyperparameters) == {"planning_steps": 3}
-
-
-def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    where = ["--world.ranges", 20, 20, 20, "--task.life.regrowth", 0, "--ticks", 60]
-    where += ["--task", "paper", "--seed", 3, "--save", "x.npz"]
-    for place in ("nest", "spread"):
-        many = ["live", "--ants", 9, "--colonies", 5, "--start", place]
-        status, out, err = call("colony", [*many, *where], capsys)
-        assert (status, err) == (0, "")
-        assert out.startswith("45 ants in 5 colonies, 60 ticks in ")
-        colony = Colony.load("x.npz")
-        assert (colony.task, colony.start) == (task(), place)
-        assert colony.seeds == (3, 4, 5, 6, 7)
-        world = worlds.open_world(3, (20, 20, 20))
-        assert set(colony.worlds) == {world}
-        training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
-        alone = Colony(world, task(), training, 5, 9, start=place)
-        alone.begin_episode()
-        alone.tick(60)
-        assert alone.outcome().deliveries[0, 0] == colony.outcome().deliveries[0, 2]
-        assert np.array_equal(alone.q_values[0], colony.q_values[2])
-        cells, _ = world.start(5, 9, place)
-        assert np.array_equal(colony.at_start["start_cells"][2], cells)
 
 
 @pytest.mark.parametrize(

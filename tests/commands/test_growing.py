@@ -111,31 +111,20 @@ def test_a_finished_sweep_grows_without_repeating_anything(kind, sweep, monkeypa
     assert_same_results("plain", "grown")
 
 
-def test_unfinished_work_grows_too(sweep, monkeypatch):
-    assert sweep(RUNS, "plain")[0] == 0
-    real = RunPoint.do
-
-    def stops(points, seeds, *more):
-        if 0.2 in (point.training.learning_rate for point in points):
-            raise KeyboardInterrupt
-        return real(points, seeds, *more)
-
-    monkeypatch.setattr(RunPoint, "do", staticmethod(stops))
-    assert sweep(RUNS.replace("[7, 2, 5, 1]", "[7, 2]"), "grown")[0] == 130
-    monkeypatch.setattr(RunPoint, "do", staticmethod(real))
-    assert sweep(RUNS, "grown")[0] == 0
-    assert_same_results("plain", "grown")
-
-
 @pytest.mark.parametrize(
     ("text", "change", "words"),
     [
-        (RUNS, ("episodes = 6", "episodes = 7"), "of other settings (episodes is 6 instead of 7)"),
-        (RUNS, ("discount = 0.9\n", "discount = 0.8\n"), "discount is 0.9 instead of 0.8"),
-        (RUNS, ("[7, 2, 5, 1]", "[7, 2, 5]"), "that this study lacks (seed 1); add them"),
-        (RUNS, ("[0.01, 0.1, 0.2]", "[0.01, 0.1, 0.3]"), "lacks (training.learning_rate 0.2)"),
-        (RUNS, ("[training]", 'task.delivery = "truncates"\n[training]'), "task.delivery is "),
-        (DRAWN, ("samples = 8", "samples = 4"), "that this study lacks (training.learning_rate 0."),
+        (
+            RUNS,
+            ("episodes = 6", "episodes = 7"),
+            "that this study lacks (episodes is 6 instead of 7",
+        ),
+        (RUNS, ("[7, 2, 5, 1]", "[7, 2, 5]"), "seeds is [7, 2, 5, 1] instead of [7, 2, 5]"),
+        (
+            DRAWN,
+            ("samples = 8", "samples = 4"),
+            "training.learning_rate is [0.",
+        ),
         (DRAWN, ("samples = 8", "samples = 8\ndesign_seed = 3"), "design.design_seed is 0 instead"),
         (DRAWN, ('"sobol"', '"random"'), "design.design is 'sobol' instead of 'random'"),
     ],
@@ -172,10 +161,12 @@ def test_other_measures_and_values_that_are_equal_floats_extend_a_sweep(sweep):
 def test_results_of_other_physics_are_refused(sweep, monkeypatch):
     assert sweep(RUNS, "a")[0] == 0
     monkeypatch.setattr("taichi_ants.studies.points.PHYSICS", 99)
-    monkeypatch.setattr("taichi_ants.studies.folder.PHYSICS", 99)
+    monkeypatch.setattr("taichi_ants.studies.command.PHYSICS", 99)
     status, _, err = sweep(RUNS, "a")
     assert status == 2
-    assert "contains results of other settings (physics is 1 instead of 99); choose another" in err
+    assert (
+        "contains results that this study lacks (physics is 1 instead of 99); choose another" in err
+    )
 
 
 def test_a_folder_of_something_else_is_left_alone(sweep):
@@ -304,9 +295,9 @@ def test_status_and_tables_of_work_in_progress(sweep, capsys, monkeypatch):
     assert Path("a/runs.csv").read_text().splitlines() == final
     _, out, _ = call("status", ["a"], capsys)
     assert "finished: results with 24 runs, since" in out
-    status, out, err = call("status", ["nothing", "a", "none"], capsys)
+    status, out, err = call("status", ["nothing"], capsys)
     assert status == 2
-    assert err.count("has no results; name the folder of a study") == 2
+    assert "has no results; name the folder of a study" in err
 
 
 def test_the_time_left_is_that_of_the_last_process(sweep, monkeypatch):

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from command_lines import call, command, contents, environment
+from command_lines import call, contents
 
 from taichi_ants.studies.points import RunPoint
 
@@ -55,32 +52,3 @@ def test_blocks_of_any_size_give_the_same(name, size, tmp_path, capsys, monkeypa
 
 # Runs a script, and says at its end how much memory the process has taken. The system's own account
 # of a process that has ended counts the one that started it, too.
-WATCHED = """
-import runpy, sys
-del sys.argv[0]
-try:
-    runpy.run_path(sys.argv[0], run_name="__main__")
-finally:
-    with open("/proc/self/status") as status:
-        print(*(line for line in status if line.startswith("VmHWM")), file=sys.stderr)
-"""
-
-
-@pytest.mark.long
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="tells what a process has taken")
-def test_a_process_with_many_seeds_stays_small(kernels, tmp_path):
-    """All of a command, with statistics."""
-    arguments = [*COMPARE, "--seeds", 5000, "--threads", 1]
-    done = subprocess.run(
-        [sys.executable, "-c", WATCHED, *command("compare", arguments)[1:]],
-        cwd=tmp_path,
-        env=environment(kernels),
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "all results are in results/" in done.stdout
-    found = re.fullmatch(r"VmHWM:\s+(\d+) kB\n\n", done.stderr)
-    assert found, done.stderr
-    assert int(found[1]) < 450_000  # all runs and resamples at once take more than a GB

@@ -68,7 +68,8 @@ def test_the_third_finding_is_the_table_of_the_guide():
 @pytest.mark.slow  # it makes the paper's comparison with 100 seeds
 def test_the_first_two_findings_and_the_printed_table(tmp_path, capsys):
     folder = tmp_path / "compare"
-    compare.start(["--out", str(folder), "--no-figures"])
+    with pytest.raises(SystemExit):
+        compare.main(["--out", str(folder), "--no-figures"])
     printed = capsys.readouterr().out
     [table] = re.findall(r"^(Learner  .*?)```", PAPER, re.DOTALL | re.MULTILINE)
     assert table in printed

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_lines import ROOT, run
+from command_lines import ROOT, numbers_in, run
 
-from taichi_ants import files
+from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.rules import registry
+from taichi_ants.studies.model_script import table
 
 MODELS = ROOT / "experiments" / "models"
 
@@ -25,7 +26,7 @@ def rows_of(name: str, seeds: int, folder, monkeypatch) -> list[dict[str, Any]]:
         runpy.run_path(str(MODELS / f"{name}.py"), run_name="__main__")
     assert ended.value.code == 0
     assert (folder / f"{name}.png").stat().st_size > 10_000
-    return files.read_csv(folder / f"{name}.csv")
+    return numbers_in(folder / f"{name}.csv")
 
 
 @pytest.mark.slow
@@ -52,15 +53,50 @@ def test_two_nests(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+def test_thresholds_divide_labour(tmp_path, monkeypatch, capsys):
+    """More ants forage at a higher demand, and those with low thresholds forage more."""
+    late = {demand: [] for demand in (0.25, 0.5, 1, 2)}
+    for row in rows_of("division_of_labour", 3, tmp_path, monkeypatch):
+        if row["tick"] > 2000:
+            late[row["demand"]].append(row["foragers"])
+    means = [np.mean(shares) for shares in late.values()]
+    assert means == sorted(means)
+    assert means[-1] > 3 * means[0] > 0.3
+    for line in capsys.readouterr().out.splitlines()[2:6]:
+        _, _, _, _, low, _, _, high, *_ = line.split()
+        assert float(low) > 1.3 * float(high)
+
+
+@pytest.mark.slow
+def test_a_colony_recovers_after_a_removal(tmp_path, monkeypatch):
+    ants = {}
+    for row in rows_of("recovery", 2, tmp_path, monkeypatch):
+        ants[row["removed"], row["seed"], row["tick"]] = row["ants"]
+    assert len(ants) == 4 * 2 * 80
+    for seed in (0, 1):
+        before, half = (ants[share, seed, 2000] for share in (0.0, 0.5))
+        assert half == before - int(0.5 * before + 0.5)
+
+
+@pytest.mark.slow
 def test_a_no_entry_pheromone(kernels: Path, tmp_path: Path) -> None:
     done = run("models/no_entry", ["--seeds", 2, "--out", tmp_path], kernels, tmp_path)
     assert done.returncode == 0, done.stderr
-    rows = files.read_csv(tmp_path / "no_entry.csv")
+    rows = numbers_in(tmp_path / "no_entry.csv")
     assert len(rows) == 2 * 4 * 2 * 30
     last = [row["delivered"] for row in rows if row["tick"] == 3000]
     assert min(last) > 0
     assert len(set(last)) > 1
-    assert (tmp_path / "no_entry.png").stat().st_size > 10_000
+
+
+def test_a_table_has_a_line_for_each_condition():
+    rows = [{"kind": kind, "x": n} for kind in "ab" for n in (1, 2, 4)]
+    low, high = bootstrap_interval(np.array([[1.0, 2.0, 4.0]]))
+    lines = table(rows).splitlines()
+    assert lines[0].split() == ["kind", "x"]
+    assert lines[2] == f"a     2.333 [{low[0]:.4g}, {high[0]:.4g}]"
+    assert len(lines) == 4
+    assert table(rows[:1]).splitlines()[2] == "a     1"
 
 
 @pytest.fixture

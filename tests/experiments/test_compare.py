@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 import shutil
 import subprocess
@@ -18,6 +17,7 @@ from command_lines import (
     call,
     contents,
     load,
+    read_csv,
     run,
 )
 from paper import process
@@ -113,11 +113,6 @@ def compare(capsys, monkeypatch):
     """Calls the script within this process, without a worker process, which `finished` has."""
     monkeypatch.setattr(process, "available_threads", lambda: 1)
     return lambda *arguments: call("compare", arguments, capsys)
-
-
-def read_csv(path):
-    with open(path, newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def config_of(row):
@@ -307,7 +302,7 @@ def test_more_seeds_keep_what_is_there_and_fewer_are_refused(tmp_path, compare):
     status, _, err = compare(*TINY, *out)
     assert status == 2
     assert_one_sentence(err)
-    assert "that this study lacks (seed 1, 2)" in err
+    assert "that this study lacks (seeds is [0, 1, 2] instead of [0]" in err
     assert compare(*TINY, "--seeds", 3, "--out", tmp_path / "at once")[0] == 0
     names = ("summary.csv", "claims.csv", "table2.csv", "runs.npz", "report.txt")
     grown, whole = (contents(tmp_path / name) for name in ("out", "at once"))

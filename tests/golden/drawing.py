@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from random_castes import with_castes
 from random_choices import NOISE, random_choice, random_noise
-from random_colonies import RandomColony, random_colony, random_training, with_nests
+from random_colonies import RandomColony, random_colony, random_task, random_training, with_nests
 from random_worlds import random_world
 
 from taichi_ants import AntsError, Colony, Interventions, World, protocol
 from taichi_ants.interventions import AddAnts, RemoveAnts
-from taichi_ants.task import Pheromone, Rewards, Task
+from taichi_ants.task import Rewards, Task
 from taichi_ants.task.constants import EMPTY
 
 UNDER = "strongest_under_carriers"
@@ -168,23 +168,9 @@ def random_trainings(learner: str, n: int, noisy: bool) -> Iterator[tuple[str, A
     deposits = {"q_learning": "fading", "sarsa": "set", "dyna_q": "none"}
     for number in range(n):
         rng = np.random.default_rng([number, len(learner), 1 + noisy])
-        deposit = deposits.get(learner, "add")
-        pheromone = Pheromone(
-            evaporation=str(rng.choice(["linear", "none"])),
-            deposit=deposit,
-            level=250 if deposit == "none" else int(rng.choice([1, 7, 250])),
-            cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
-            slope=int(rng.choice([1, 10, 100])) if deposit == "fading" else None,
-            view="strongest" if deposit == "fading" else "half",
-        )
-        task = Task(
+        task = random_task(
+            *(rng, deposits.get(learner, "add"), _rewards(number)),
             observation=names.get(learner, "trail_levels"),
-            rewards=_rewards(number),
-            pheromone=pheromone,
-            delivery=str(rng.choice(["terminates", "truncates"])),
-            turns_at_queen=bool(rng.random() < 0.3),
-            evaporation_in_training=bool(rng.random() < 0.7),
-            evaporation_in_evaluation=bool(rng.random() < 0.7),
             choice=random_choice(number, "softmax" if noisy else "greedy"),
             noise=random_noise(number, NOISE if noisy else ""),
         )

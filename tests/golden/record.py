@@ -51,35 +51,16 @@ from taichi_ants import (  # noqa: E402
 
 # What is hashed of a colony after each tick. These lists are the only place that knows the names.
 OF_COLONY = ("q_values", "stimuli", "running", "episode_ticks", "deliveries", "living")
-OF_ANTS = (
-    *("numbers", "cells", "headings", "carrying", "paper_states", "states", "actions", "executed"),
-    *("events", "rewards", "streams", "nests", "castes", "idle", "thresholds"),
-)
+OF_ANTS = ("numbers", "cells", "headings", "carrying", "paper_states", "states", "actions",
+    "executed", "events", "rewards", "streams", "nests", "castes", "idle",
+    "thresholds")  # fmt: skip
 OF_SNAPSHOT = ("ground", "trail", "food_kinds", "ant_foods", "ant_carried")
-OF_EPISODES = (
-    *("returns", "ticks", "deliveries", "first_delivery", "moves", "blocked", "carried", "births"),
-    *(
-        "waiting_births",
-        "deaths",
-        "regrown",
-        "living",
-        "deliveries_by_nest_and_kind",
-        "caste_deliveries",
-    ),
-)
-OF_TRACE = (
-    *("episodes", "steps", "cells", "headings", "paper_states", "states", "actions", "rewards"),
-    *(
-        "next_paper_states",
-        "next_states",
-        "terminated",
-        "events",
-        "q_values",
-        "td_errors",
-        "tables",
-    ),
-    "executed",
-)
+OF_EPISODES = ("returns", "ticks", "deliveries", "first_delivery", "moves", "blocked", "carried",
+    "births", "waiting_births", "deaths", "regrown", "living", "deliveries_by_nest_and_kind",
+    "caste_deliveries")  # fmt: skip
+OF_TRACE = ("episodes", "steps", "cells", "headings", "paper_states", "states", "actions",
+    "rewards", "next_paper_states", "next_states", "terminated", "events", "q_values",
+    "td_errors", "tables", "executed")  # fmt: skip
 OF_RUNS = ("returns", "steps", "deliveries")
 OF_STATE = ("q", "random_states", "epsilon", "learning_rate")
 MEASURES = ("deliveries", "living", "carriers", "distance")
@@ -89,32 +70,16 @@ SHORT = {r"seeds = \d+": "seeds = 2", "episodes = 500": "episodes = 50"}
 SHORT |= {"episodes = 30": "episodes = 4", r"\bticks = \d+": "ticks = 90"}
 SHORT |= {r"measure_every = \d+": "measure_every = 30", r"\[0, 3000\]": "[0, 40]"}
 SWEEPS = ("learning_rates", "trails", "late_branch")
+COMPARE = "experiments/compare.py --quick --no-figures"
+COLONY = (
+    "experiments/colony.py study --seeds 2 --sizes 1 4 --no-figures --episodes 3 --ticks 90 "
+    "--rollouts 2 --world-kinds paper open piles moving"
+)
+TABLES = ("runs.npz", "summary.csv", "table2.csv", "claims.csv", "behaviours.csv", "baselines.csv")
 STUDIES = {
-    "compare": (
-        ["experiments/compare.py", "--quick", "--no-figures"],
-        ("runs.npz", "summary.csv", "table2.csv", "claims.csv", "behaviours.csv", "baselines.csv"),
-    ),
-    "colony": (
-        [
-            *(
-                "experiments/colony.py",
-                "study",
-                "--seeds",
-                "2",
-                "--sizes",
-                "1",
-                "4",
-                "--no-figures",
-            ),
-            *("--episodes", "3", "--ticks", "90", "--rollouts", "2"),
-            *("--world-kinds", "paper", "open", "piles", "moving"),
-        ],
-        ("seeds.csv", "conditions.csv", "differences.csv"),
-    ),
-    **{
-        name: (["experiments/sweep.py", f"{name}.toml"], ("runs.csv", "summary.csv"))
-        for name in SWEEPS
-    },
+    "compare": (COMPARE, TABLES),
+    "colony": (COLONY, ("seeds.csv", "conditions.csv", "differences.csv")),
+    **{name: (f"experiments/sweep.py {name}.toml", ("runs.csv", "summary.csv")) for name in SWEEPS},
 }
 
 
@@ -228,8 +193,8 @@ def studies(names: Iterable[str]) -> Iterator[tuple[str, str]]:
                 text = re.sub(long, short, text)
             Path(folder, f"{name}.toml").write_text(text)
         for name in names:
-            (script, *arguments), files = STUDIES[name]
-            command = [sys.executable, ROOT / script, *arguments, "--out", name]
+            line, files = STUDIES[name]
+            command = [sys.executable, *f"{ROOT}/{line} --out {name}".split()]
             path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
             environ = {**os.environ, "PYTHONPATH": path}
             ran = subprocess.run(command, cwd=folder, env=environ, capture_output=True, text=True)

@@ -48,17 +48,6 @@ def test_the_behaviour_policy_itself_has_weights_of_one():
         assert ours.low < ours.value < ours.high
 
 
-def test_importance_sampling_is_unbiased_in_short_episodes():
-    """Of eight steps of random ants; the model is off, since what they see is not Markov."""
-    table = np.random.default_rng(2).normal(size=(128, 5)).astype(np.float32)
-    data = record(worlds.paper(), None, 40_000, 3, 8)
-    truth = record(worlds.paper(), table, 40_000, 4, 8, epsilon=0.5).returns(0.9)
-    found = importance_sampling(data, table, 0.9, 0.5, weighted=False)
-    assert found.low < truth.mean() < found.high
-    assert found.high - found.low < 0.5
-    assert 1 < found.effective_sample_size < 20_000
-
-
 def test_an_interval_covers_the_truth_about_as_often_as_it_says():
     table = np.random.default_rng(2).normal(size=(128, 5)).astype(np.float32)
     world = worlds.paper()

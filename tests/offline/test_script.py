@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from command_lines import assert_one_sentence, run
+from command_lines import run
 
 
 @pytest.mark.long
@@ -18,9 +18,3 @@ def test_offline_prints_three_tables(kernels: Path, tmp_path: Path) -> None:
     # With what exploits its knowledge, every learner delivers.
     best = [line for line in rows[0] if line.startswith("| epsilon 0.1 | 100000")]
     assert best[0].count("1.00 [1.00, 1.00]") == 4
-
-
-def test_mistakes_end_in_a_sentence(kernels: Path, tmp_path: Path) -> None:
-    done = run("offline", ["--seeds", 1], kernels, tmp_path)
-    assert done.returncode == 2
-    assert_one_sentence(done.stderr)

@@ -14,7 +14,7 @@ from taichi_ants.protocol import At, Every
 from taichi_ants.report.odd import Model, described
 from taichi_ants.settings import MISSING, all_of, declared, flat
 from taichi_ants.studies.points import ColonyPoint, FixedPolicy, RunPoint, settings_of
-from taichi_ants.studies.sweep import read_sweep, sweep_of
+from taichi_ants.studies.sweep import plan, sweep_of
 from taichi_ants.task import Field, Food, Task, foraging
 
 SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99)
@@ -254,7 +254,7 @@ def test_rows_of_tables_have_as_many_cells_as_their_heads():
 
 def test_the_guide_shows_a_part_of_a_real_description():
     path = ROOT / "experiments/sweeps/trails.toml"
-    text = of_sweep(read_sweep(path), files.tomllib.loads(path.read_text()))
+    text = of_sweep(plan({"file": path}), files.tomllib.loads(path.read_text()))
     guide = (ROOT / "docs/archives.md").read_text("utf-8")
     shown = guide.split("```markdown\n")[1].split("```")[0]
     assert len(shown) > 500

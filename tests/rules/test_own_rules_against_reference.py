@@ -34,7 +34,7 @@ MODELS = {
         {"sharing": "independent", "learner": "n_step_sarsa", "fields": "a", "changes": True},
     ),
 }
-MARKS = {"weber": (), "shaped": pytest.mark.optimised, "blocked weber": pytest.mark.long}
+MARKS = {"weber": (), "blocked weber": pytest.mark.long}
 MARKED = [pytest.param(name, marks=MARKS.get(name, pytest.mark.slow)) for name in MODELS]
 
 

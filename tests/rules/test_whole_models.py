@@ -151,11 +151,9 @@ def steps_compared(
 
     An episode ends early if its world does not allow an intervention.
     """
-    rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
-    given = (drawn.world, drawn.task, drawn.training, drawn.seed)
-    colony = Colony(*given, **rules, schedule=schedule)
+    colony = Colony(*drawn.model, **drawn.options, schedule=schedule)
     timetable = Timetable(colony, protocol, TICKS)
-    plain = ReferenceColony(*given, **rules)
+    plain = ReferenceColony(*drawn.model, **drawn.options)
     twin, steps = Protocol(plain, protocol), 0
     try:
         for _ in range(EPISODES):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from taichi_ants import files
 from taichi_ants.errors import AntsError
 from taichi_ants.studies.design import Choices, Design, Range
-from taichi_ants.studies.sweep import read_sweep, sweep_of
+from taichi_ants.studies.sweep import plan, sweep_of
 
 SHARES = st.floats(0, 1)
 AXES = {
@@ -118,14 +118,14 @@ def test_points_of_saltelli_differ_in_one_setting():
 def test_the_points_of_a_file_are_built_from_drawn_values(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text(COLONY, "utf-8")
-    sweep = read_sweep(path)
+    sweep = plan({"file": path})
     assert len(sweep.settings) == len(set(sweep.study.points)) == 8
     for row, point in zip(sweep.settings, sweep.study.points, strict=True):
         assert point.task.pheromone.half_life == row["task.pheromone.half_life"]
         assert point.task.noise.slip == row["task.noise.slip"]
     assert sweep.facts()["design"] == {"design": "sobol", "design_seed": 0}
     path.write_text(COLONY.replace('"sobol"', '"latin_hypercube"'), "utf-8")
-    assert read_sweep(path).facts()["design"]["samples"] == 8
+    assert plan({"file": path}).facts()["design"]["samples"] == 8
 
 
 def test_declared_whole_numbers_need_no_key():
@@ -137,70 +137,45 @@ def test_declared_whole_numbers_need_no_key():
     assert all(type(row[name]) is int for row in rows for name in ("ants", "task.pheromone.level"))
 
 
-def test_seeds_of_worlds_are_whole_numbers():
-    text = COLONY.replace("task.noise.slip = { from = 0", "world.seed = { from = 0").replace(
-        "to = 0.5 }", "to = 90 }"
-    )
-    text = text.replace("[task]", '[world]\npreset = "open"\n[task]')
-    rows = sweep_of(files.tomllib.loads(text)).settings
-    assert {type(row["world.seed"]) for row in rows} == {int}
-
-
-def test_no_setting_has_the_name_of_a_key_of_ranges():
-    from taichi_ants import worlds
-    from taichi_ants.settings import all_of
-    from taichi_ants.task import Task
-
-    of_worlds = [one for name in worlds.names() for one in worlds.settings_of(name)]
-    assert not {one.name for one in (*all_of(Task), *of_worlds)} & {"from", "to"}
-
-
 SLIP, HALF = "{ from = 0, to = 0.5 }", '{ from = 10, to = 1000, scale = "log" }'
 WRONG = {
     "design": ('"sobol"', '"halton"', ["design is 'halton'", "latin_hypercube, sobol, random"]),
-    "samples": ("samples = 8", "", ["samples is missing"]),
-    "few samples": ("samples = 8", "samples = 0", ["samples is 0", "between 1 and"]),
-    "samples of a grid": ('design = "sobol"', "", ["samples is 8", 'the design is "grid"']),
-    "seed": ("samples = 8", "samples = 8\ndesign_seed = -1", ["design_seed is -1"]),
-    "reversed": (SLIP, "{ from = 0.5, to = 0 }", ["slip.from is 0.5; it must be below 0.0"]),
-    "empty": (SLIP, "{ from = 0.5, to = 0.5 }", ["slip.from is 0.5; it must be below 0.5"]),
-    "one end": (SLIP, "{ from = 0.5 }", ["task.noise.slip.to is None"]),
+    "samples": ("samples = 8", "", ["samples is None"]),
+    "samples of a grid": ('design = "sobol"', "", ["samples is for the designs latin_hypercube"]),
+    "reversed": (SLIP, "{ from = 0.5, to = 0 }", ["slip is from 0.5 to 0; both must be a number"]),
     "key": (
         SLIP,
         "{ from = 0, too = 1 }",
         ["a key of the range task.noise.slip is 'too'", "from, to, scale"],
     ),
-    "text": (SLIP, '{ from = "a", to = 1 }', ["slip.from is 'a'", "a finite number"]),
-    "infinite": (SLIP, "{ from = 0, to = inf }", ["slip.to is inf"]),
+    "text": (SLIP, '{ from = "a", to = 1 }', ["slip is from 'a' to 1"]),
     "scale": (SLIP, '{ from = 0, to = 1, scale = "ln" }', ["slip.scale is 'ln'", "linear, log"]),
     "log of 0": (
         HALF,
         '{ from = 0, to = 9, scale = "log" }',
-        ["half_life.from is 0.0", "above 0 with the scale log"],
+        ["half_life is from 0 to 9", "above 0 for the scale log"],
     ),
-    "log below 0": (HALF, '{ from = -1, to = 9, scale = "log" }', ["half_life.from is -1.0"]),
     "out of range": (SLIP, "{ from = 0, to = 1.5 }", ["noise.slip` is 1.5", "between 0 and 1"]),
     "steps": (SLIP, "{ from = 0, to = 1, steps = 3 }", ["slip.steps is 3", "'sobol'"]),
-    "whole": (SLIP, "{ from = 0, to = 0.5, whole = true }", ["slip.to is 0.5", "whole number"]),
-    "not a flag": (SLIP, "{ from = 0, to = 1, whole = 1 }", ["slip.whole is 1"]),
-    "choice": (SLIP, '[0, "often"]', ["noise.slip` is 'often'"]),
+    "whole": (
+        SLIP,
+        "{ from = 0, to = 0.5, whole = true }",
+        ["must be a whole number"],
+    ),
     "below 1": (
         f"task.noise.slip = {SLIP}",
         "capacity = { from = 0, to = 3 }",
-        ["capacity.from is 0; it must lie between 1 and"],
+        ["capacity is 0"],
     ),
     "nothing varies": (
         f"half_life = {HALF}\ntask.noise.slip = {SLIP}",
         "half_life = 5",
         ["has single values only"],
     ),
-    "not a setting": ("task.noise.slip", "task.noise.slap", ["'task.noise.slap' is not a setting"]),
     "grid": ('design = "sobol"\nsamples = 8', "", ["half_life.steps is None", "steps = 5"]),
     "sensitivity": ("sobol", "random", ["sensitivity = true with the design 'random'"]),
     "not a power": ("samples = 8", "samples = 9", ["samples = 9", "a power of 2"]),
-    "against": ("[task]", "against.task.noise.slip = 0\n[task]", ["against is for a grid"]),
-    "twice": ("[vary]", '[vary]\n"task.noise.slip" = 1', ["task.noise.slip is in [vary] twice"]),
-    "fixed, too": ("[task]", "[task]\nnoise.slip = 0", ["slip is in [vary] and in the fixed"]),
+    "against": ("[task]", "against.task.noise.slip = 0\n[task]", ["with a grid, it must be"]),
 }
 
 

@@ -8,15 +8,12 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, worlds
-from taichi_ants.engines.colony.layout import NestRow, WorldRow
-from taichi_ants.learners.policies import trail_follower
+from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.rendering import writers
 from taichi_ants.studies.interruption import held, stoppable
 from taichi_ants.studies.one_colony import check_places, live, summary
-from taichi_ants.task import foraging
 
 TASK = Task(delivery="truncates", evaporation_in_training=True)
 TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
@@ -86,27 +83,6 @@ def test_a_stopped_colony_ends_at_a_whole_tick_with_all_its_files(tmp_path, caps
     assert (tmp_path / "a.gif").exists()
 
 
-def test_a_colony_with_pictures_far_apart_hears_a_signal_between_them(tmp_path) -> None:
-    """With `--frame-interval 1000000` it used to be heard at the next picture, minutes later."""
-    shares = []
-
-    def progress(share: float) -> None:
-        shares.append(share)
-        if len(shares) == 3:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    colony, other = begun(), begun()
-    path = str(tmp_path / "a.gif")
-    with pytest.raises(SystemExit), stoppable(), held() as stopped:
-        live(colony, 10**7, progress, stopped, render=path, frame_interval=10**6)
-    assert 3 < colony.ticks < 100
-    other.tick(colony.ticks)
-    assert colony == other
-    assert len(shares) == 4
-    with Image.open(path) as picture:
-        assert picture.n_frames == 2  # the start, and how it was when it was stopped
-
-
 def test_the_summary_counts_in_words() -> None:
     def summed(**counts: int) -> str:
         colony = begun(ants=1)
@@ -126,30 +102,3 @@ def test_the_summary_counts_in_words() -> None:
     assert one.endswith(" % of the moves blocked, 1 birth.")
     assert "\n2 deliveries by tick 1, " in two
     assert two.endswith(" % of the moves blocked, 2 births, 1 death.")
-
-
-@pytest.mark.parametrize("capacity", [None, 5])
-def test_the_summary_tells_why_births_wait(capacity: int | None) -> None:
-    task = Task().replace(life={"births": True})
-    colony = Colony(worlds.paper(), task, TRAINING, [0, 1], ants=2, capacity=capacity)
-    colony.begin_episode()
-    assert "wait" not in summary(colony, 1, 1.0)
-    nests, living = colony.arrays["nests"], colony.arrays["worlds"][WorldRow.LIVING]
-    nests[NestRow.STORE] = 3, 4
-    living[1] = colony.capacity
-    assert colony.outcome().waiting_births.tolist() == [[3, 4]]
-    which = "default --capacity is 68" if capacity is None else "--capacity is 5"
-    end = f"\nBirths that wait: 4 until an ant dies (the {which}), 3 for a free cell."
-    assert summary(colony, 1, 1.0).endswith(end)
-
-
-def test_births_wait_for_a_free_cell_as_measures_count_them() -> None:
-    task = foraging().replace(life={"births": True, "regrowth": 0})
-    rule = TrainingConfig.frozen()
-    policy = {"sharing": "frozen", "q_values": trail_follower("ants")}
-    colony = Colony(worlds.paper(), task, rule, ants=6, **policy)
-    found = colony.run(1, 900, measures=["waiting_births", "living"], every=50)
-    waiting, living = (found.series.values[name] for name in ("waiting_births", "living"))
-    assert waiting[-1] == found.waiting_births.item() > 0
-    assert found.deliveries.item() == found.births.item() + waiting[-1]
-    assert living[-1] == colony.capacity == 76

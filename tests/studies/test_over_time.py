@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-from PIL import Image
 
-from taichi_ants.studies.one_colony import Span, Totals, draw, save_figure, spans
+from taichi_ants.studies.one_colony import Span, Totals, draw, spans
 
 TOTALS = [Totals(5, 10, 100, 50), Totals(7, 14, 300, 100), Totals(8, 14, 300, 100)]
 ROWS = [Span(5, 7, 2.0, 0.25), Span(7, 8, 0.0, 0.0)]
@@ -25,13 +22,3 @@ def test_the_figure_shows_its_rows() -> None:
         assert steps.values.tolist() == expected
         assert np.array_equal(steps.edges, [5, 7, 8])
     assert lower.get_xlim() == (5, 8)
-
-
-def test_both_files_are_written_even_of_no_time_at_all(tmp_path: Path) -> None:
-    tmp_path /= "new"
-    save_figure(ROWS, "3 ants", tmp_path / "a.b.png")
-    save_figure([], "3 ants", tmp_path / "none.png")
-    lines = (tmp_path / "a.b.csv").read_text("utf-8").splitlines()
-    assert lines == ["from_tick,to_tick,foods_per_tick,blocked", "5,7,2.0,0.25", "7,8,0.0,0.0"]
-    for name in ("a.b.png", "none.png"):
-        assert Image.open(tmp_path / name).width == 1620

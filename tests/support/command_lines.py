@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib
 import json
 import os
@@ -9,10 +10,14 @@ import runpy
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
+
+from taichi_ants import commands
 
 ROOT = Path(__file__).resolve().parents[2]
 EXPERIMENTS = ROOT / "experiments"
@@ -87,7 +92,8 @@ def call(
     name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[str]
 ) -> tuple[int, str, str]:
     """Return exit status, standard output and standard error of a command run in this process."""
-    return _ended(lambda: load(name).main([*map(str, arguments)]), capsys)
+    main = load(name).main if name in STUDIES else partial(commands.run, name)
+    return _ended(lambda: main([*map(str, arguments)]), capsys)
 
 
 def call_script(
@@ -106,6 +112,24 @@ def _ended(work: Callable[[], object], capsys: pytest.CaptureFixture[str]) -> tu
         work()
     written = capsys.readouterr()
     return ended.value.code, written.out, written.err
+
+
+def read_csv(path: Path | str) -> list[dict[str, str]]:
+    """Return the rows of a CSV file."""
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def numbers_in(path: Path | str) -> list[dict[str, Any]]:
+    """Return the rows of a CSV file, with numbers as floats, and empty fields as None."""
+
+    def value(text: str) -> Any:
+        try:
+            return float(text)
+        except ValueError:
+            return text or None
+
+    return [{name: value(text) for name, text in row.items()} for row in read_csv(path)]
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -15,7 +15,7 @@ from taichi_ants import runtime
 def interrupted_after_launch(number: int = 1) -> Iterator[None]:
     """A context in which launch `number` is done, and then interrupted."""
     runtime.start()
-    from taichi_ants.engines.arguments import Launch
+    from taichi_ants.engines.launch import Launch
 
     usual, done = Launch.__call__, []
 

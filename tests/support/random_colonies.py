@@ -225,6 +225,27 @@ def _field(seed: int, name: str, view: str) -> Field:
     return Field(**{**rules, "view": view, "deposited_when": str(laid)})
 
 
+def random_task(rng: np.random.Generator, deposit: str, rewards: Rewards, **rules: Any) -> Task:
+    """Return a task that independent runs can have."""
+    pheromone = Pheromone(
+        evaporation=str(rng.choice(["linear", "none"])),
+        deposit=deposit,
+        level=250 if deposit == "none" else int(rng.choice([1, 7, 250])),
+        cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
+        slope=int(rng.choice([1, 10, 100])) if deposit == "fading" else None,
+        view="strongest" if deposit == "fading" else "half",
+    )
+    return Task(
+        rewards=rewards,
+        pheromone=pheromone,
+        delivery=str(rng.choice(["terminates", "truncates"])),
+        turns_at_queen=bool(rng.random() < 0.3),
+        evaporation_in_training=bool(rng.random() < 0.7),
+        evaporation_in_evaluation=bool(rng.random() < 0.7),
+        **rules,
+    )
+
+
 def random_training(rng: np.random.Generator, learner: str) -> TrainingConfig:
     """Return a configuration with extreme values."""
     return TrainingConfig(

@@ -17,18 +17,17 @@ from taichi_ants import (
     Task,
     TrainingConfig,
     TrainingResult,
-    files,
     load_policy,
     save_policy,
     worlds,
 )
-from taichi_ants.engines.runs.results import RunState
+from taichi_ants.engines.runs.engine import RunState
 from taichi_ants.live.session import Session
 from taichi_ants.live.setup import Setup
 from taichi_ants.offline.dataset import COLUMNS
-from taichi_ants.studies.folder import manifest_in, write_json
+from taichi_ants.studies.folder import json_in, write_json
 from taichi_ants.studies.store import BLOCKS, Store
-from taichi_ants.studies.sweep import read_sweep
+from taichi_ants.studies.sweep import plan
 from taichi_ants.worlds import World
 
 WORLD = World((3, 3, 3), (0, 0, 0), foods=[(2, 0, 0)])
@@ -77,10 +76,9 @@ def small_files(folder: Path) -> dict[str, SmallFile]:
         "colony": of("colony.npz", Colony.load),
         "session": of("session.npz", lambda path: Session.load(path).interventions.state()),
         "block": SmallFile(_block(folder), lambda: _read_block(folder)),
-        "manifest": of("manifest.json", lambda path: manifest_in(path.parent)),
+        "manifest": of("manifest.json", lambda path: json_in(path)),
         "map": of("map.txt", worlds.load_map)._replace(checked=False),
         "sweep": of("sweep.toml", _sweep)._replace(checked=False),
-        "table of others": of("other.csv", files.read_csv)._replace(checked=False),
     }
     save_policy(found["policy"].path, Q_VALUES, {"seed": 3})
     facts = {"kind": "policy", "version": 2, "observation": "paper", "metadata": {"seed": 3}}
@@ -92,7 +90,6 @@ def small_files(folder: Path) -> dict[str, SmallFile]:
     colony.save(found["colony"].path)
     Session(Setup("paper", TASK, SARSA, ants=2)).save(found["session"].path)
     write_json(folder / "manifest.json", {"seconds": 2.0, "files": {}})
-    files.write_csv(found["table of others"].path, [{"a": 1.5, "b": None}], ("a", "b"))
     found["map"].path.write_text(MAP)
     found["sweep"].path.write_text(SWEEP)
     return found
@@ -161,4 +158,4 @@ def _read_block(folder: Path) -> dict[str, np.ndarray]:
 
 
 def _sweep(path: Path) -> Any:
-    return read_sweep(path).study
+    return plan({"file": path}).study

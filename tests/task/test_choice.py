@@ -119,13 +119,6 @@ def test_a_task_without_noise_draws_nothing():
 CELLS = Task(choice="deneubourg")
 GIVEN = Arguments("paper", 9, "index", None)  # to environments
 REFUSED = [
-    (lambda: Choice("greedy", temperature=2.0), "`task.choice.temperature` is 2.0; leave it out"),
-    (lambda: Noise(slip=1.5), "`task.noise.slip` is 1.5; it must be between 0 and 1."),
-    (
-        lambda: Task(choice=Choice("deneubourg", carriers_follow="trail"), homing_cue="trail"),
-        "but `task.homing_cue` is 'trail', which ants with food follow already",
-    ),
-    (lambda: Task("ants", choice="deneubourg"), "`task.observation` is 'ants'; it must be 'paper'"),
     (
         lambda: Colony(worlds.paper(), CELLS, PLAIN),
         "so ants choose without action values, but sharing is 'shared'",

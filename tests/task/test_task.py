@@ -9,8 +9,20 @@ import numpy as np
 import pytest
 from random_rewards import random_rewards
 
+from taichi_ants import At
 from taichi_ants.errors import AntsError
-from taichi_ants.task import Life, Pheromone, Rewards, Task, Traffic, observations
+from taichi_ants.task import (
+    Choice,
+    Field,
+    Life,
+    Noise,
+    Pheromone,
+    Rewards,
+    Task,
+    Threshold,
+    Traffic,
+    observations,
+)
 from taichi_ants.task.observations import Observation, registry
 
 
@@ -94,3 +106,68 @@ def test_the_numbers_that_kernels_take():
         for evaporation in ("linear", "none", "exponential")
         for diffusion in (0, 0.1)
     ] == [False, True, False, True, True, True]
+
+
+HOME = {"home": {"deposited_when": "without_food"}}
+
+
+def test_cues_are_fields_of_the_task():
+    task = Task(fields=HOME, homing_cue="home")
+    assert task == Task().replace(fields=HOME, homing_cue="home") == Task.from_dict(task.as_dict())
+    assert task.fields["home"] == Field(deposited_when="without_food")
+
+
+def castes(**settings):
+    return lambda: Task(castes={"a": settings})
+
+
+UNLESS, UNKNOWN, ADD = (
+    "; leave it out unless `",
+    "is not a setting; choose ",
+    "or the name of a field",
+)
+CELLS = Choice("deneubourg", carriers_follow="trail")
+WIDE = {"distribution": "uniform", "value": 1, "spread": 2}
+REFUSED = [
+    (lambda: Pheromone(half_life=10), f"task.pheromone.half_life` is 10.0{UNLESS}evaporation`"),
+    (lambda: Pheromone("none", half_life=10), f"task.pheromone.half_life` is 10.0{UNLESS}evapor"),
+    (lambda: Pheromone(cap=10), f"task.pheromone.cap` is 10{UNLESS}deposit` is 'add'."),
+    (lambda: Pheromone(slope=10), f"task.pheromone.slope` is 10{UNLESS}deposit` is 'fading'."),
+    (lambda: Pheromone(deposit="none", level=3), f"task.pheromone.level` is 3{UNLESS}deposit`"),
+    (lambda: Traffic(reward_pushed=True), f"task.traffic.reward_pushed` is True{UNLESS}swap`"),
+    (lambda: Traffic(carriers_first=True), f"task.traffic.carriers_first` is True{UNLESS}swap`"),
+    (lambda: Choice("greedy", temperature=2.0), f"task.choice.temperature` is 2.0{UNLESS}rule`"),
+    (lambda: Noise(slip=1.5), "task.noise.slip` is 1.5; it must be between 0 and 1."),
+    (lambda: Task(choice=CELLS, homing_cue="trail"), "which ants with food follow already"),
+    (lambda: Task("ants", choice="deneubourg"), "task.observation` is 'ants'; it must be 'paper'"),
+    (lambda: Task(homing_cue="hoem"), f"is 'hoem'; it must be one of compass, trail, {ADD}"),
+    (lambda: Task(outbound_cue="compass"), f"is 'compass'; it must be one of trail, {ADD}"),
+    *(
+        (lambda name=name: Task(fields={name: {}}), f"has a field {name!r}, but that name is taken")
+        for name in ("trail", "compass", "all", "none")
+    ),
+    (lambda: Field(slop=3), f"task.fields.NAME.slop` {UNKNOWN}slope."),
+    (lambda: Task(fiels={}), f"task.fiels` {UNKNOWN}fields."),
+    (lambda: At(3, remove_ant=3), f"at.remove_ant` {UNKNOWN}remove_ants."),
+    (lambda: Threshold().replace(valu=1), f"task.castes.NAME.threshold.valu` {UNKNOWN}value."),
+    (castes(threshold={"valu": 3}), f"task.castes.a.threshold.valu` {UNKNOWN}value."),
+    (castes(threshold=-1), "task.castes.a.threshold.value` is -1; it must be between 0 and 1e+06."),
+    (castes(threshold=3), f"task.castes.a.threshold` is 'fixed'{UNLESS}task.labour.rule`"),
+    (castes(threshold=WIDE), "it must be at most the value, 1.0"),
+    (lambda: Task(labour="thresholds"), "ants have no thresholds; add a caste"),
+    (lambda: Task(castes={"a": 3}), "task.castes.a` is 3; it must be a table of settings."),
+    (lambda: Task(castes={f"a{k}": {} for k in range(17)}), "at most 16"),
+    (castes(share=0.3), "add up to 0.3; they must add up to 1"),
+    (lambda: Task(castes={"a": {"share": 0.7}, "b": {"share": 0.7}}), "add up to 1.4"),
+    (castes(share=1, ants=2), "task.castes.a.ants` is 2, but `share` is 1.0; give one of them."),
+    (castes(k=2), "because `task.choice.rule` is 'greedy'"),
+    (castes(lays="trail, home"), f"'home'; it must be one of all, none, trail, {ADD}"),
+    (castes(homing_cue="home"), f"is 'home'; it must be one of compass, trail, {ADD}"),
+]
+
+
+@pytest.mark.parametrize(("make", "says"), REFUSED, ids=[says[:40] for _, says in REFUSED])
+def test_wrong_tasks_are_refused_in_one_sentence(make, says):
+    with pytest.raises(AntsError) as caught:
+        make()
+    assert says in str(caught.value)

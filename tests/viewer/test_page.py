@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 import taichi_ants
-from taichi_ants import Colony, TrainingConfig, World, rollout, worlds
-from taichi_ants.commands import render
+from taichi_ants import Colony, TrainingConfig, World, commands, rollout, worlds
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import Episode, colours
 from taichi_ants.task import Caste, Food, Task
@@ -122,7 +121,7 @@ def test_the_command_writes_pages(tmp_path, capsys):
         ["colony", *given, str(ants), "--ants", "3", "--ticks", "9", "--follow", "2"],
     ):
         with pytest.raises(SystemExit) as done:
-            render.main(arguments)
+            commands.run("render", arguments)
         assert done.value.code == 0
     assert capsys.readouterr().out.startswith(f"{ant}: 34 steps, return 45, delivered\n")
     assert "<title>walks</title>" in ant.read_text(encoding="utf-8")

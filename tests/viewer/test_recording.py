@@ -56,9 +56,8 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
             changes=True,
             noise=NOISE if sharing == "independent" else NO_NOISE,
         )
-        rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
-        given = (drawn.world, drawn.task, drawn.training, drawn.seed)
-        colony, plain = Colony(*given, **rules), ReferenceColony(*given, **rules)
+        colony = Colony(*drawn.model, **drawn.options)
+        plain = ReferenceColony(*drawn.model, **drawn.options)
         snapshots, tables, ants = [], [], []
         colony.begin_episode(TICKS)
         plain.begin_episode()

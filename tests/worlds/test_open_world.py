@@ -65,34 +65,6 @@ def test_rocks_cover_their_share_and_no_rock_more(ranges: tuple, share: float) -
     assert 0 <= excess < 1 + 3 * radius * (radius + 1)
 
 
-def test_rocks_make_way_for_the_clearing_and_the_piles_only() -> None:
-    ranges = (40, 30, 35)
-    world = open_world(5, ranges)
-    cells = all_cells(world)
-    scattered = module.scatter_rocks(world.grid, 0.15, Stream(5, module._STREAM_ROCKS, 0))
-    rocks = set(map(tuple, world.grid.cells(np.flatnonzero(scattered)).tolist()))
-    clearing = set(map(tuple, cells[distance(cells, (0, 0, 0)) <= 3].tolist()))
-    assert clearing & rocks
-    assert set(map(tuple, world.obstacles.tolist())) == rocks - clearing - pile_cells(world)
-
-
-def test_drawn_ranges_fill_their_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn = []
-
-    def note(grid: AxialGrid, *_: object) -> World:
-        drawn.append(grid.ranges)
-        return World((3, 3, 3), (0, 0, 0), foods=[(1, 0, 0)])
-
-    monkeypatch.setattr(module, "_draw", note)
-    for seed in range(1000):
-        open_world(seed)
-    drawn = np.array(drawn)
-    assert drawn.min() == 10
-    assert drawn.max() == 100
-    # The mean of 1000 numbers drawn evenly from 10 .. 100 has a standard deviation of 0.83.
-    assert np.abs(drawn.mean(axis=0) - 55).max() < 5
-
-
 def test_pinned_worlds() -> None:
     """Worlds of known seeds stay as they are, whatever the version of NumPy."""
     world = open_world(0)

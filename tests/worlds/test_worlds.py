@@ -1,17 +1,18 @@
-"""What a world holds, its arrays, and where its ants start."""
-
-import dataclasses
+"""What a world holds and computes, and where its ants start."""
 
 import numpy as np
 import pytest
-from hexagons import distance
+from hexagons import distance, neighbours
+from hypothesis import given
+from hypothesis import strategies as st
 
 from taichi_ants import worlds
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_START_CELL, STREAM_START_HEADING
+from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.reference.ants import starts
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds import World
 from taichi_ants.worlds.world import STARTS as WHERE
 
@@ -45,39 +46,6 @@ def test_contents_are_stored_in_normal_form() -> None:
     assert world.obstacles.tolist() == [[0, 0, 0], [2, 0, 1]]
     assert world.trails.tolist() == [[0, 0, 1, 3], [0, 2, 2, 25]]
     assert world.ants.tolist() == [[0, 0, 1, 5], [1, 0, 0, 2]]
-
-
-def test_ground_and_trail_levels() -> None:
-    world = small()
-    index = world.grid.index
-    ground, levels = world.ground(), world.trail_levels()
-    assert ground.dtype == np.uint8
-    assert levels.dtype == np.int32
-    assert ground[index((0, 0, 0))] == QUEEN
-    assert ground[index((2, 0, 0))] == FOOD
-    assert (ground[index([(0, 2, 0), (0, 0, 2)])] == OBSTACLE).all()
-    assert (ground[~world.grid.exists] == OBSTACLE).all()
-    assert (ground == EMPTY).sum() == 19 - 4
-    assert levels[index([(1, 0, 0), (1, 1, 0)])].tolist() == [7, 7]
-    assert levels.sum() == 14
-
-
-def test_distances_and_closer_by_hand() -> None:
-    world = World((10, 10, 10), (0, 9, 9))
-    distances, closer = world.distances(), world.closer()
-    assert distances.dtype == np.int32
-    assert closer.dtype == np.uint8
-    index = world.grid.index
-    assert distances[index([(0, 9, 9), (0, 8, 8), (9, 0, 0), (0, 0, 9)])].tolist() == [0, 1, 18, 9]
-    assert (distances[~world.grid.exists] == 0).all()
-    assert (closer[~world.grid.exists] == 0).all()
-    # Straight above the queen only the way down is nearer; elsewhere two ways can be.
-    assert closer[index((0, 8, 8))] == 1 << 3
-    assert closer[index((9, 0, 0))] == 1 << 3
-    assert closer[index((0, 0, 9))] == 1 << 2
-    assert closer[index((0, 0, 0))] == 1 << 3
-    assert closer[index((1, 1, 0))] == 1 << 3 | 1 << 4
-    assert closer[index((0, 9, 9))] == 0
 
 
 def test_the_papers_world() -> None:
@@ -143,9 +111,35 @@ def test_ants_that_are_spread_start_on_any_free_cells_by_the_seed(seed: int) -> 
         world.start(seed, 2, "moon")
 
 
-def test_reachable_foods() -> None:
-    # A corridor: queen, empty, food, food, empty, food.
-    corridor = World((8, 1, 1), (0, 0, 0), foods=[(2, 0, 0), (3, 0, 0), (5, 0, 0)])
-    assert corridor.reachable_foods().tolist() == [True, False, False]
-    assert dataclasses.replace(corridor, foods=[(1, 0, 0)]).reachable_foods().tolist() == [False]
-    assert World((8, 1, 1), (0, 0, 0)).reachable_foods().shape == (0,)
+@st.composite
+def crowded_worlds(draw: st.DrawFn) -> World:
+    """Worlds in which rocks and foods block many ways."""
+    ranges = draw(st.tuples(*[st.integers(1, 6)] * 3))
+    grid = AxialGrid(ranges)
+    cells = grid.cells(np.flatnonzero(grid.exists)).tolist()
+    kinds = draw(st.lists(st.sampled_from("..##F"), min_size=len(cells), max_size=len(cells)))
+    kinds[draw(st.integers(0, len(cells) - 1))] = "Q"
+    listed = {kind: [c for c, k in zip(cells, kinds, strict=True) if k == kind] for kind in "#FQ"}
+    return World(ranges, listed["Q"][0], foods=listed["F"], obstacles=listed["#"])
+
+
+@given(crowded_worlds())
+def test_foods_are_reachable_where_a_walk_leads(world: World) -> None:
+    ground = world.ground()
+
+    def beside(cell: tuple) -> list[tuple]:
+        around = [tuple(n) for n in neighbours(cell).tolist()]
+        return [n for n in around if (np.array(n) < world.ranges).all()]
+
+    def empty(cell: tuple) -> bool:
+        return ground[world.grid.index(cell)] == EMPTY
+
+    reached: set[tuple] = set()
+    frontier = [cell for cell in beside(world.queen) if empty(cell)]
+    while frontier:
+        cell = frontier.pop()
+        if cell not in reached:
+            reached.add(cell)
+            frontier += [other for other in beside(cell) if empty(other)]
+    expected = [not reached.isdisjoint(beside(tuple(food))) for food in world.foods.tolist()]
+    assert world.reachable_foods().tolist() == expected

@@ -91,7 +91,7 @@ class Stepper:
         # The caller may have reset Taichi, or forked the process.
         runtime.check_on_cpu(runtime.start(), "colonies run")
         if name not in self._launches:
-            from taichi_ants.engines.arguments import Launch
+            from taichi_ants.engines.launch import Launch
             from taichi_ants.engines.colony import kernels, learning
 
             variant = kernels.variant(state.model)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.engines.layout import Command, unpack_cells
+from taichi_ants.engines.layout import EXTRA_CELLS, Command, unpack_cells
 from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
@@ -56,7 +56,7 @@ class BatchedEnvironments:
         common = laid_out(self.worlds, task, falls)
         size = common["size"]
         number = np.arange(n, dtype=np.int32) % len(self.worlds)
-        own = np.empty((n, size + 2), np.int32)
+        own = np.empty((n, size + EXTRA_CELLS), np.int32)
         own[:, :size] = common["world"].reshape(-1, size)[number]
         own[:, size:] = size, -1  # no cell has changed, see `step.restore`
         self.arrays: dict[str, Any] = {
@@ -154,7 +154,7 @@ class BatchedEnvironments:
         """Return the launch of a rollout with observations of `width` numbers."""
         if (follows, width) not in self._launches:
             runtime.start()  # configures Taichi before the imports below
-            from taichi_ants.engines.arguments import Launch
+            from taichi_ants.engines.launch import Launch
             from taichi_ants.engines.runs.rollout_kernel import WIDTH, rollout_kernel
             from taichi_ants.engines.runs.step import Rules
 
@@ -165,7 +165,7 @@ class BatchedEnvironments:
     def snapshot(self, number: int) -> Snapshot:
         """Return the present state of an ant's world; arrays are copies."""
         arrays, grid = self.arrays, self.worlds[0].grid
-        own = self.arrays["shared_cells"] + number * (grid.size + 2)
+        own = self.arrays["shared_cells"] + number * (grid.size + EXTRA_CELLS)
         ground, levels = unpack_cells(arrays["cells"][own : own + grid.size])
         trail = np.maximum(levels - arrays["steps"][number] * arrays["evaporates"], 0)
         one = slice(number, number + 1)

@@ -1,4 +1,4 @@
-"""Arguments of the kernel of independent runs, and the loop over its launches.
+"""The state of independent runs, the arguments of their kernel, and the loop over its launches.
 
 A launch cannot be interrupted, so it should take about a second even if every episode uses all of
 its steps. Within that bound, few large launches are best, because threads wait for the last run of
@@ -18,19 +18,23 @@ import numpy as np
 from taichi_ants import learners, runtime
 from taichi_ants.engines.layout import (
     EPSILON_DECAY,
+    EXTRA_CELLS,
     N_SETTINGS,
     OUTCOMES,
     SETTINGS,
+    STEPS,
+    TRACE,
     compass_of,
     pack_cells,
+    padded,
 )
-from taichi_ants.engines.runs.results import RunState
-from taichi_ants.grid.constants import STREAM_ROLLOUT
+from taichi_ants.grid.constants import STREAM_ANT, STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.learner import Learner
+from taichi_ants.learners.learner import Learner, Memory
+from taichi_ants.records import Record
 from taichi_ants.task import Task
-from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
@@ -40,58 +44,84 @@ _STEP_NS = 25  # a step of Q-learning on one thread of a slow core
 _WORKSPACE_BYTES = 256 * 2**20
 _MOST_NUMBERS = 2**30  # in one array of a launch, because kernels use 32-bit indices
 _PARALLEL_RUNS_ON_GPU = 4096
+MAX_ROLLOUT_STEPS = 1_000_000  # that a launch records
 
 
-@dataclass(frozen=True)
-class Runs:
-    """n runs that learn by one learner, or follow tables without learning.
+@dataclass(frozen=True, eq=False, repr=False)
+class RunState(Record):
+    """The state of runs after their last episode, from which training resumes, bit for bit.
 
-    Attributes:
-        seeds: The seed of each run, Python integers (n,), for worlds that do not list their ant.
-        settings: float64 (n, columns), `layout.SETTINGS` and the hyperparameters of the learner.
-        state: The state of the runs, contiguous arrays (n, ...), which the kernel updates.
-        streams: uint64 (n, episodes), a random stream for each episode; none for learners.
-        cost: The time of a step, relative to a step of Q-learning.
+    Attributes (leading axes: the runs, for example (configurations, seeds)):
+        q: float32 (..., 1 + tables, n_states, 8), the table by which the ant acts, then further
+            tables of the learner; a row has 5 action values and 3 unused numbers.
+        floats, integers: float32 and int32 (..., k), the memory of the learner, as large as any
+            learner here needs, in multiples of 8; see `taichi_ants.learners.Memory`.
+        random_states: uint64 (...,), the ants' random streams.
+        epsilon, learning_rate: float64 (...,), values for the next episode.
     """
 
-    learner: Learner | None
-    seeds: np.ndarray
-    settings: np.ndarray
-    state: RunState
-    streams: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), np.uint64))
-    cost: float = 1.0
+    q: np.ndarray
+    floats: np.ndarray
+    integers: np.ndarray
+    random_states: np.ndarray
+    epsilon: np.ndarray
+    learning_rate: np.ndarray
 
     @classmethod
-    def learning(
-        cls, configs: Sequence[TrainingConfig], seeds: Sequence[int], state: RunState
-    ) -> Runs:
-        """Return runs of all seeds and configurations, which share learner and hyperparameters."""
-        learner = learners.get(configs[0].learner)
-        more = learner.settings(configs[0])
-        settings = [(*(getattr(one, name) for name in SETTINGS), *astuple(more)) for one in configs]
+    def empty(
+        cls,
+        shape: tuple[int, ...],
+        n_states: int,
+        memory: Memory = Memory(),  # noqa: B008
+    ) -> RunState:
+        """Return a state of zeros for runs of this shape."""
         return cls(
-            learner,
-            np.tile(np.array(seeds, dtype=object), len(configs)),
-            np.repeat(np.array(settings, dtype=np.float64), len(seeds), axis=0),
-            state,
-            cost=learner.cost(more),
+            q=np.zeros((*shape, 1 + memory.tables, n_states, ROW), dtype=np.float32),
+            floats=np.zeros((*shape, memory.floats), dtype=np.float32),
+            integers=np.zeros((*shape, memory.integers), dtype=np.int32),
+            random_states=np.zeros(shape, dtype=np.uint64),
+            epsilon=np.zeros(shape, dtype=np.float64),
+            learning_rate=np.zeros(shape, dtype=np.float64),
         )
 
     @classmethod
-    def following(
-        cls, tables: np.ndarray, seeds: np.ndarray, numbers: np.ndarray, epsilon: float
-    ) -> Runs:
-        """Return runs that follow tables (n, n_states, 5) in the rollouts of these `numbers`."""
-        state = RunState.empty((len(tables),), tables.shape[-2])
-        state.q[:, 0, :, :N_ACTIONS] = tables
-        state.epsilon[:] = epsilon
-        streams = stream_state(words_of(seeds)[:, None], STREAM_ROLLOUT, numbers[None, :])
-        settings = np.zeros((len(tables), N_SETTINGS))
-        settings[:, EPSILON_DECAY] = 1.0
-        return cls(None, seeds, settings, state, streams)
+    def initial(
+        cls, configs: Sequence[TrainingConfig], seeds: Sequence[int], n_states: int
+    ) -> RunState:
+        """Return the state of new runs, with leading axes (configurations, seeds)."""
+        state = cls.empty((len(configs), len(seeds)), n_states, memory_for(configs, n_states))
+        state.random_states[:] = stream_state(words_of(seeds), STREAM_ANT, 0)
+        for config, q, epsilon, rate in zip(
+            configs, state.q, state.epsilon, state.learning_rate, strict=True
+        ):
+            q[..., :N_ACTIONS] = config.initial_q
+            epsilon[:], rate[:] = config.epsilon, config.learning_rate
+        return state
 
-    def __len__(self) -> int:
-        return len(self.seeds)
+    def part(self, configs: slice | list[int]) -> RunState:
+        """Return the runs of some configurations, in arrays (runs, ...).
+
+        The arrays are views if `configs` is a slice, else copies.
+        """
+        n, arrays = self.epsilon[configs].size, vars(self).items()
+        return RunState(
+            **{name: array[configs].reshape(n, *array.shape[2:]) for name, array in arrays}
+        )
+
+    def put(self, configs: slice | list[int], part: RunState) -> None:
+        """Overwrite the runs of some configurations with a part that has copies, not views."""
+        for name, array in vars(self).items():
+            new = getattr(part, name)
+            if not np.may_share_memory(array, new):
+                array[configs] = new.reshape(array[configs].shape)
+
+
+def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
+    """Return a memory size that suffices for each of the learners, which must be registered."""
+    memories = [
+        astuple(learners.get(config.learner).memory_for(config, n_states)) for config in configs
+    ]
+    return padded(Memory(*np.max(memories, axis=0).tolist()))
 
 
 def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]:
@@ -112,96 +142,195 @@ def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]
     }
 
 
-class Launcher:
-    """The compiled kernel for runs in one world, and its arguments."""
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """n runs in one world that learn by one learner, or follow tables without learning.
 
-    def __init__(
-        self, world: World, task: Task, max_steps: int, runs: Runs, traced: bool = False
-    ) -> None:
-        # Imported here, because Taichi must be configured first; see `runtime`.
-        from taichi_ants.engines.arguments import Launch
-        from taichi_ants.engines.runs.kernels import run_kernel
-        from taichi_ants.engines.runs.step import EXTRA_CELLS, Rules
-
-        self._runs = runs
-        self._cells, self._headings = world.first_starts(words_of(runs.seeds))
-        self.cells_of_a_run = world.grid.size + EXTRA_CELLS
-        rules, learner = Rules.of(task), runs.learner
-        self._launch = Launch(partial(run_kernel, rules, learner, traced))
-        falls = task.evaporation_in_training if learner else task.evaporation_in_evaluation
-        self._common = {**laid_out([world], task, falls), "max_steps": max_steps}
-        self.launch(slice(0, 0), slice(0, 0))  # compiles the kernel
-
-    def launch(self, some: slice, episodes: slice, **arrays: Any) -> None:
-        """Do some episodes of some runs, and write the results into the arrays.
-
-        Arrays are flat, one run after another. The sizes of a memory are multiples of 8, see
-        `layout.padded`.
-        """
-        runs, state, start_cells = self._runs, self._runs.state, self._cells[some]
-        values = {
-            "n_runs": len(start_cells),
-            "n_episodes": episodes.stop - episodes.start,
-            "regrows": 0,  # food that grows back at once has no effect, as a delivery is the end
-            "start_cells": start_cells,
-            "start_headings": self._headings[some],
-            "settings": runs.settings[some],
-            "epsilon": state.epsilon[some],
-            "learning_rate": state.learning_rate[some],
-            "random_states": state.random_states[some],
-            "streams": np.ascontiguousarray(runs.streams[some, episodes]),
-            "tables": state.q.shape[1],
-            "floats_by_8": state.floats.shape[1] // 8,
-            "integers_by_8": state.integers.shape[1] // 8,
-            "q": state.q[some],
-            "floats": state.floats[some],
-            "integers": state.integers[some],
-            "cells": np.empty(len(start_cells) * self.cells_of_a_run, np.int32),
-            "keeps_tables": 0,  # 1 to write the table after each step
-            "outcomes": np.zeros((0, 0, 0), np.int32),  # (3, n, n_episodes): `layout.OUTCOMES`
-            "trace": np.zeros((0, 0), np.int32),  # (n * n_episodes * max_steps, `layout.TRACE`)
-            "trace_chances": np.zeros(0),  # the probability with which the action was chosen
-            "trace_errors": np.zeros(0, np.float32),  # the TD error of each step
-            "trace_tables": np.zeros(0, np.float32),  # the table after each step
-            **arrays,
-        }
-        for name, value in values.items():
-            if isinstance(value, np.ndarray):
-                flat = value if name in ("outcomes", "trace") else value.reshape(-1)
-                # Taichi allows no arrays of length 0.
-                values[name] = flat if flat.size else np.zeros((1,) * flat.ndim, flat.dtype)
-        self._launch({**values, **self._common})
-
-
-def do_episodes(
-    world: World,
-    task: Task,
-    max_steps: int,
-    runs: Runs,
-    outcomes: np.ndarray,
-    progress: Progress | None = None,
-) -> float:
-    """Do the next episodes of n runs, update their state, and write `outcomes` (3, n, episodes).
-
-    Returns:
-        The time without compilation: CPU seconds of all threads, or wall-clock seconds on a GPU.
+    Attributes:
+        seeds: The seed of each run, Python integers (n,), for worlds that do not list their ant.
+        settings: float64 (n, columns), `layout.SETTINGS` and the hyperparameters of the learner.
+        state: The state of the runs, contiguous arrays (n, ...), which the kernel updates.
+        streams: uint64 (n, episodes), a random stream for each episode; none for learners.
+        cost: The time of a step, relative to a step of Q-learning.
     """
-    episodes = outcomes.shape[2]
-    settings = runtime.start()
-    # Other processes do not change the CPU time of this one.
-    clock = time.process_time if settings.arch == "cpu" else time.perf_counter
-    workers = settings.threads if settings.arch == "cpu" else _PARALLEL_RUNS_ON_GPU
-    launcher = Launcher(world, task, max_steps, runs)
-    widest = max(array[0].size for array in vars(runs.state).values())
-    size = size_of_launch(workers, episodes, max_steps, runs.cost, launcher.cells_of_a_run, widest)
-    seconds = 0.0
-    for some, part in pieces(len(runs), episodes, *size, progress):
-        block = np.empty((len(OUTCOMES), some.stop - some.start, part.stop - part.start), np.int32)
-        began = clock()
-        launcher.launch(some, part, outcomes=block)
-        seconds += clock() - began
-        outcomes[:, some, part] = block
-    return seconds
+
+    world: World
+    task: Task
+    max_steps: int
+    learner: Learner | None
+    seeds: np.ndarray
+    settings: np.ndarray
+    state: RunState
+    streams: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), np.uint64))
+    cost: float = 1.0
+
+    @classmethod
+    def learning(
+        cls,
+        world: World,
+        task: Task,
+        max_steps: int,
+        configs: Sequence[TrainingConfig],
+        seeds: Sequence[int],
+        state: RunState | None = None,
+    ) -> Runs:
+        """Return runs of all seeds and configurations, which share learner and hyperparameters.
+
+        Without a `state`, they are new.
+        """
+        learner = learners.get(configs[0].learner)
+        more = learner.settings(configs[0])
+        settings = [(*(getattr(one, name) for name in SETTINGS), *astuple(more)) for one in configs]
+        if state is None:
+            state = RunState.initial(configs, seeds, task.n_states).part(slice(None))
+        return cls(
+            *(world, task, max_steps, learner),
+            np.tile(np.array(seeds, dtype=object), len(configs)),
+            np.repeat(np.array(settings, dtype=np.float64), len(seeds), axis=0),
+            state,
+            cost=learner.cost(more),
+        )
+
+    @classmethod
+    def following(
+        cls,
+        world: World,
+        task: Task,
+        max_steps: int,
+        tables: np.ndarray,
+        seeds: Sequence[int] | np.ndarray,
+        numbers: Sequence[int],
+        epsilon: float,
+    ) -> Runs:
+        """Return runs that follow tables (n, n_states, 5) in the rollouts of these `numbers`."""
+        state = RunState.empty((len(tables),), task.n_states)
+        state.q[:, 0, :, :N_ACTIONS] = tables
+        state.epsilon[:] = epsilon
+        words = np.array(seeds, dtype=object)
+        streams = stream_state(words_of(words)[:, None], STREAM_ROLLOUT, np.array(numbers)[None, :])
+        settings = np.zeros((len(tables), N_SETTINGS))
+        settings[:, EPSILON_DECAY] = 1.0
+        return cls(world, task, max_steps, None, words, settings, state, streams)
+
+    def __len__(self) -> int:
+        return len(self.seeds)
+
+    @property
+    def cells_of_a_run(self) -> int:
+        """The number of integers for the cells of a run."""
+        return self.world.grid.size + EXTRA_CELLS
+
+    def compiled(self, traced: bool = False) -> Callable[..., None]:
+        """Return a function (some, episodes, **arrays), after compiling its kernel.
+
+        It does some episodes of some runs, both slices, and writes the results into the arrays. All
+        arrays of a launch are flat, one run after another. The sizes of a memory are multiples of
+        8, see `layout.padded`.
+        """
+        # Imported here, because Taichi must be configured first; see `runtime`.
+        from taichi_ants.engines.launch import Launch
+        from taichi_ants.engines.runs.kernels import run_kernel
+        from taichi_ants.engines.runs.step import Rules
+
+        task, state = self.task, self.state
+        cells, headings = self.world.first_starts(words_of(self.seeds))
+        launch = Launch(partial(run_kernel, Rules.of(task), self.learner, traced))
+        falls = task.evaporation_in_training if self.learner else task.evaporation_in_evaluation
+        common = {**laid_out([self.world], task, falls), "max_steps": self.max_steps}
+
+        def do(some: slice, episodes: slice, **arrays: Any) -> None:
+            n = some.stop - some.start
+            values = {
+                "n_runs": n,
+                "n_episodes": episodes.stop - episodes.start,
+                "regrows": 0,  # food that grows back at once has no effect after a delivery
+                "start_cells": cells[some],
+                "start_headings": headings[some],
+                "settings": self.settings[some],
+                "epsilon": state.epsilon[some],
+                "learning_rate": state.learning_rate[some],
+                "random_states": state.random_states[some],
+                "streams": np.ascontiguousarray(self.streams[some, episodes]),
+                "tables": state.q.shape[1],
+                "floats_by_8": state.floats.shape[1] // 8,
+                "integers_by_8": state.integers.shape[1] // 8,
+                "q": state.q[some],
+                "floats": state.floats[some],
+                "integers": state.integers[some],
+                "cells": np.empty(n * self.cells_of_a_run, np.int32),
+                "keeps_tables": 0,  # 1 to write the table after each step
+                "outcomes": np.zeros((0, 0, 0), np.int32),  # (3, n, n_episodes): `OUTCOMES`
+                "trace": np.zeros((0, 0), np.int32),  # (n * n_episodes * max_steps, `TRACE`)
+                "trace_chances": np.zeros(0),  # the probability with which the action was chosen
+                "trace_errors": np.zeros(0, np.float32),  # the TD error of each step
+                "trace_tables": np.zeros(0, np.float32),  # the table after each step
+                **arrays,
+            }
+            for name, value in values.items():
+                if isinstance(value, np.ndarray):
+                    flat = value if name in ("outcomes", "trace") else value.reshape(-1)
+                    # Taichi allows no arrays of length 0.
+                    values[name] = flat if flat.size else np.zeros((1,) * flat.ndim, flat.dtype)
+            launch({**values, **common})
+
+        do(slice(0, 0), slice(0, 0))
+        return do
+
+    def do_episodes(self, outcomes: np.ndarray, progress: Progress | None = None) -> float:
+        """Do the next episodes, update the state, and write `outcomes` (3, n, episodes).
+
+        Returns:
+            The time without compilation: CPU seconds of all threads, or wall-clock seconds on a
+            GPU.
+        """
+        episodes = outcomes.shape[2]
+        settings = runtime.start()
+        # Other processes do not change the CPU time of this one.
+        clock = time.process_time if settings.arch == "cpu" else time.perf_counter
+        workers = settings.threads if settings.arch == "cpu" else _PARALLEL_RUNS_ON_GPU
+        launch = self.compiled()
+        sizes = self.cells_of_a_run, max(array[0].size for array in vars(self.state).values())
+        size = size_of_launch(workers, episodes, self.max_steps, self.cost, *sizes)
+        seconds = 0.0
+        for some, part in pieces(len(self), episodes, *size, progress):
+            block = np.empty_like(outcomes[:, some, part], order="C")
+            began = clock()
+            launch(some, part, outcomes=block)
+            seconds += clock() - began
+            outcomes[:, some, part] = block
+        return seconds
+
+    def record(
+        self, episodes: int, progress: Progress | None = None, tables: np.ndarray | None = None
+    ) -> Iterator[dict[str, np.ndarray]]:
+        """Yield the steps of the next episodes, in pieces, and update the state.
+
+        A piece has the columns `TRACE`, with episodes numbered from 0 in each run. Further arrays
+        (n,) are "runs", int64, the number of the run; "chances", float64, the probability of each
+        action; and "td_errors", float32. Pieces of a run are in order. If `tables` is given, the
+        kernel writes the table after each step of the piece into it.
+        """
+        runtime.start()
+        launch, max_steps = self.compiled(traced=True), self.max_steps
+        keeps = {} if tables is None else {"keeps_tables": 1, "trace_tables": tables}
+        # A step needs ten times as much memory as a cell of the world.
+        most_runs = MAX_ROLLOUT_STEPS // max(max_steps, self.world.grid.size // 10)
+        runs_each = max(1, min(len(self), most_runs))
+        episodes_each = max(1, MAX_ROLLOUT_STEPS // (runs_each * max_steps))
+        for some, part in pieces(len(self), episodes, runs_each, episodes_each, progress):
+            n_runs, n_episodes = some.stop - some.start, part.stop - part.start
+            capacity = n_episodes * max_steps  # the most steps of a run
+            trace = np.empty((n_runs * capacity, len(TRACE)), np.int32)
+            chances, errors = np.empty(n_runs * capacity), np.empty(n_runs * capacity, np.float32)
+            outcomes = np.zeros((len(OUTCOMES), n_runs, n_episodes), np.int32)
+            arrays = {"trace": trace, "trace_errors": errors, "trace_chances": chances}
+            launch(some, part, outcomes=outcomes, **arrays, **keeps)
+            steps_of_run = outcomes[STEPS].sum(axis=1)
+            taken = (np.arange(capacity) < steps_of_run[:, None]).reshape(-1)
+            columns = dict(zip(TRACE, trace[taken].T, strict=True))
+            columns["episodes"] += part.start
+            columns["runs"] = np.repeat(np.arange(some.start, some.stop), steps_of_run)
+            yield {**columns, "chances": chances[taken], "td_errors": errors[taken]}
 
 
 def size_of_launch(

@@ -14,6 +14,7 @@ from taichi_ants.engines.layout import (
     DELIVERIES,
     DISCOUNT,
     EPSILON_DECAY,
+    EXTRA_CELLS,
     LEARNING_RATE_DECAY,
     MIN_EPSILON,
     MIN_LEARNING_RATE,
@@ -21,7 +22,7 @@ from taichi_ants.engines.layout import (
     RETURNS,
     STEPS,
 )
-from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, Rules, act, observe_function, restore
+from taichi_ants.engines.runs.step import Ant, Rules, act, observe_function, restore
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of

@@ -1,108 +1,30 @@
-"""Results of training and evaluation, with the state from which training resumes."""
+"""Results of training and evaluation, and step-by-step traces of them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import learners, measures
+from taichi_ants import measures
 from taichi_ants.arguments import checked_max_steps, checked_seeds
-from taichi_ants.engines.layout import OUTCOMES, padded
+from taichi_ants.engines.layout import OUTCOMES
+from taichi_ants.engines.runs.engine import RunState
 from taichi_ants.errors import as_array, expect
 from taichi_ants.files import PathLike
 from taichi_ants.files.archives import Kind
-from taichi_ants.grid.constants import STREAM_ANT
-from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.learner import Memory
 from taichi_ants.measures.finished import counts_of_lone_ant, of_lone_ants
 from taichi_ants.measures.tidy import Measured, Tidy, seed_array
 from taichi_ants.records import Record
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
+from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 _KIND = Kind("training result", 7, "TrainingResult.save")
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class RunState(Record):
-    """The state of runs after their last episode, from which training resumes, bit for bit.
-
-    Attributes (leading axes: the runs, for example (configurations, seeds)):
-        q: float32 (..., 1 + tables, n_states, 8), the table by which the ant acts, then further
-            tables of the learner; a row has 5 action values and 3 unused numbers.
-        floats, integers: float32 and int32 (..., k), the memory of the learner, as large as any
-            learner here needs, in multiples of 8; see `taichi_ants.learners.Memory`.
-        random_states: uint64 (...,), the ants' random streams.
-        epsilon, learning_rate: float64 (...,), values for the next episode.
-    """
-
-    q: np.ndarray
-    floats: np.ndarray
-    integers: np.ndarray
-    random_states: np.ndarray
-    epsilon: np.ndarray
-    learning_rate: np.ndarray
-
-    @classmethod
-    def empty(
-        cls,
-        shape: tuple[int, ...],
-        n_states: int,
-        memory: Memory = Memory(),  # noqa: B008
-    ) -> RunState:
-        """Return a state of zeros for runs of this shape."""
-        return cls(
-            q=np.zeros((*shape, 1 + memory.tables, n_states, ROW), dtype=np.float32),
-            floats=np.zeros((*shape, memory.floats), dtype=np.float32),
-            integers=np.zeros((*shape, memory.integers), dtype=np.int32),
-            random_states=np.zeros(shape, dtype=np.uint64),
-            epsilon=np.zeros(shape, dtype=np.float64),
-            learning_rate=np.zeros(shape, dtype=np.float64),
-        )
-
-    @classmethod
-    def initial(
-        cls, configs: Sequence[TrainingConfig], seeds: Sequence[int], n_states: int
-    ) -> RunState:
-        """Return the state of new runs, with leading axes (configurations, seeds)."""
-        state = cls.empty((len(configs), len(seeds)), n_states, memory_for(configs, n_states))
-        state.random_states[:] = stream_state(words_of(seeds), STREAM_ANT, 0)
-        for config, q, epsilon, rate in zip(
-            configs, state.q, state.epsilon, state.learning_rate, strict=True
-        ):
-            q[..., :N_ACTIONS] = config.initial_q
-            epsilon[:], rate[:] = config.epsilon, config.learning_rate
-        return state
-
-    def part(self, configs: slice | list[int]) -> RunState:
-        """Return the runs of some configurations, in arrays (runs, ...).
-
-        The arrays are views if `configs` is a slice, else copies.
-        """
-        n, arrays = self.epsilon[configs].size, vars(self).items()
-        return RunState(
-            **{name: array[configs].reshape(n, *array.shape[2:]) for name, array in arrays}
-        )
-
-    def put(self, configs: slice | list[int], part: RunState) -> None:
-        """Overwrite the runs of some configurations with a part that has copies, not views."""
-        for name, array in vars(self).items():
-            new = getattr(part, name)
-            if not np.may_share_memory(array, new):
-                array[configs] = new.reshape(array[configs].shape)
-
-
-def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
-    """Return a memory size that suffices for each of the learners, which must be registered."""
-    memories = [
-        astuple(learners.get(config.learner).memory_for(config, n_states)) for config in configs
-    ]
-    return padded(Memory(*np.max(memories, axis=0).tolist()))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -219,6 +141,72 @@ class Rollouts(Record, Tidy):
         n, several = arrays["returns"].shape[:2]
         names = ("",) if n == 1 else tuple(f"table {number}" for number in range(n))
         return _measured(arrays, self.seeds or tuple(range(several)), names)
+
+
+@dataclass(frozen=True, eq=False)
+class RolloutArguments:
+    """The arguments of `rollout` or `trace_training` that reproduce a trace.
+
+    `q_values`, float (n_states, 5), is the table that the ant followed with `epsilon`; None if the
+    ant learned. `config` configures its learner; None if the ant did not learn.
+    """
+
+    world: World
+    task: Task
+    seed: int
+    max_steps: int
+    number: int = 0
+    q_values: np.ndarray | None = None
+    epsilon: float = 0.0
+    config: TrainingConfig | None = None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trace(Record):
+    """The record of n steps; cell, heading and state are those before the action.
+
+    Attributes (int32 (n,) unless noted):
+        episodes: Number of the episode, from 0; in `trace_policies`, number of the policy.
+        steps: Number of the step in its episode, from 0.
+        cells: int32 (n, 3), cube coordinates in normal form.
+        headings: Heading of the ant, 0 to 5.
+        paper_states, states: The paper's state, see `taichi_ants.task.states`; state index, which
+            is the same with the paper's observation.
+        actions, rewards, events: Action, 0 to 4; its reward; its result, see `Event`.
+        executed: Action as executed, which differs from the chosen one only if actions slip.
+        next_paper_states, next_states: The paper's state and state index after the step.
+        terminated: bool (n,), whether the learner treated the next state as terminal.
+        q_values: float32 (n, 5), the action values of the state when the action was chosen.
+        td_errors: float32 (n,), the TD error of the step; None without learning.
+        tables: float32 (n, n_states, 5), the Q table after the step; None without learning.
+        arguments: Those that reproduce it; None for several policies, or if you made it yourself.
+    """
+
+    episodes: np.ndarray
+    steps: np.ndarray
+    cells: np.ndarray
+    headings: np.ndarray
+    paper_states: np.ndarray
+    states: np.ndarray
+    actions: np.ndarray
+    rewards: np.ndarray
+    next_paper_states: np.ndarray
+    next_states: np.ndarray
+    terminated: np.ndarray
+    events: np.ndarray
+    q_values: np.ndarray
+    td_errors: np.ndarray | None = None
+    tables: np.ndarray | None = None
+    executed: np.ndarray | None = None
+    arguments: RolloutArguments | None = field(default=None, compare=False, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    @property
+    def delivered(self) -> np.ndarray:
+        """Whether the ant delivered in each step, bool (n,)."""
+        return self.events == Event.DELIVERED
 
 
 def _measured(

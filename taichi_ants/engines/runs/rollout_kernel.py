@@ -12,9 +12,8 @@ from typing import Any
 
 import taichi as ti
 
-from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
+from taichi_ants.engines.layout import EXTRA_CELLS, TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.step import (
-    EXTRA_CELLS,
     Ant,
     Rules,
     act,

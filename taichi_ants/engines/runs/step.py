@@ -63,10 +63,6 @@ class Rules(NamedTuple):
         return cls(task.sees, deposit, half, noise.slip > 0, noise.misread > 0, softly)
 
 
-# After the cells of a run: the first and last cell that the episode has changed.
-EXTRA_CELLS = 2
-
-
 @ti.func
 def restore(a: ti.template(), base, origin, first, last):
     """Reset the cells from `first` to `last` of a run to those of its world."""

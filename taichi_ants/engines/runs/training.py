@@ -1,10 +1,13 @@
-"""Training and evaluation of many ants, each alone in its own world."""
+"""Training, evaluation and traces of many ants, each alone in its own world.
+
+Traces come from the same kernel as training and evaluation, compiled to record each step.
+"""
 
 from __future__ import annotations
 
 import copy
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import astuple, replace
 from functools import partial
 from typing import Any
@@ -12,15 +15,23 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import arguments, runtime
-from taichi_ants.engines.layout import OUTCOMES
-from taichi_ants.engines.runs.engine import Progress, Runs, do_episodes
-from taichi_ants.engines.runs.results import Rollouts, RunState, TrainingResult, memory_for
+from taichi_ants.engines.layout import OUTCOMES, TRACE
+from taichi_ants.engines.runs.engine import (
+    MAX_ROLLOUT_STEPS,
+    Progress,
+    Runs,
+    RunState,
+    memory_for,
+)
+from taichi_ants.engines.runs.results import RolloutArguments, Rollouts, Trace, TrainingResult
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.policies import check_finite, checked_values
+from taichi_ants.learners.policies import check_finite, checked_table, checked_values
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EPISODE_STEPS, EPISODES
+from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, N_ACTIONS
 from taichi_ants.worlds.world import World
+
+MAX_TABLE_ROWS = 12_800_000  # of 32 bytes each; a trace keeps the table after each training step
 
 
 def train(
@@ -112,10 +123,11 @@ def _train(
         chosen, n = [configs[c] for c in group], len(group)
         # A slice copies nothing.
         where = slice(group[0], group[0] + n) if group[-1] - group[0] == n - 1 else group
-        runs = Runs.learning(chosen, seeds, result.state.part(where))
+        state = result.state.part(where)
+        runs = Runs.learning(result.world, result.task, result.max_steps, chosen, seeds, state)
         into = outcomes[:, where].reshape(len(OUTCOMES), len(runs), episodes)  # a view, or a copy
         part = progress and partial(_report, progress, done, n, len(configs))
-        seconds += do_episodes(result.world, result.task, result.max_steps, runs, into, part)
+        seconds += runs.do_episodes(into, part)
         outcomes[:, where] = into.reshape(len(OUTCOMES), n, len(seeds), episodes)
         check_finite(runs.state.q, chosen, seeds)
         result.state.put(where, runs.state)
@@ -168,9 +180,108 @@ def evaluate(
     epsilon = arguments.checked_share("epsilon", epsilon)
     runtime.start(threads, arch)
     flat = tables.reshape(-1, *tables.shape[-2:])
-    runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)
+    runs = Runs.following(world, task, max_steps, flat, run_seeds, range(rollouts), epsilon)
     outcomes = np.empty((3, len(runs), rollouts), np.int32)
-    do_episodes(world, task, max_steps, runs, outcomes, progress)
+    runs.do_episodes(outcomes, progress)
     returns, steps, deliveries = outcomes.reshape(3, *shape, rollouts)
     of_tables = tuple(run_seeds[: shape[-1] if shape else 1].tolist())
     return Rollouts(returns, steps, deliveries, of_tables)
+
+
+def rollout(
+    world: World,
+    q_values: np.ndarray,
+    seed: int = 0,
+    number: int = 0,
+    max_steps: int = EPISODE_STEPS,
+    task: Task | None = None,
+    epsilon: float = 0.0,
+) -> Trace:
+    """Return the trace of one episode with a table (n_states, 5): rollout `number` of the seed.
+
+    Instead of the table, you can pass the `TrainingResult` of a single run, or a `Policy`. Other
+    arguments and errors are those of `evaluate`. Numbers start at 0.
+    """
+    task, max_steps = arguments.checked_run(world, task, max_steps)
+    table = checked_table(q_values, task)
+    seeds = arguments.checked_seeds_for(seed, ())
+    number = checked_whole("number", number, least=0)
+    epsilon = arguments.checked_share("epsilon", epsilon)
+    runs = Runs.following(world, task, max_steps, table[None], seeds, [number], epsilon)
+    seed, kept = int(seeds[0]), table.copy()
+    made_by = RolloutArguments(world, task, seed, max_steps, number, kept, epsilon)
+    return next(_followed(runs, made_by))
+
+
+def trace_policies(
+    world: World,
+    q_values: np.ndarray,
+    seeds: Sequence[int],
+    max_steps: int = EPISODE_STEPS,
+    task: Task | None = None,
+) -> Iterator[Trace]:
+    """Yield the traces of rollout 0 of many policies (n, n_states, 5), some policies at a time.
+
+    `seeds` has one seed per policy, and may repeat seeds. Other arguments are those of `evaluate`.
+    """
+    task, max_steps = arguments.checked_run(world, task, max_steps)
+    tables = checked_values(q_values, task)
+    yield from _followed(Runs.following(world, task, max_steps, tables, seeds, [0], epsilon=0.0))
+
+
+def _followed(runs: Runs, made_by: RolloutArguments | None = None) -> Iterator[Trace]:
+    """Yield the traces of one rollout of each policy; its number is that of the episode."""
+    _check_length(runs.max_steps, MAX_ROLLOUT_STEPS)
+    for steps in runs.record(episodes=1):
+        values = runs.state.q[steps["runs"], 0, steps["states"], :N_ACTIONS]
+        steps["episodes"] = steps["runs"].astype(np.int32)
+        yield _trace(runs.world, steps, q_values=values, arguments=made_by)
+
+
+def trace_training(
+    world: World,
+    config: TrainingConfig,
+    seed: int = 0,
+    episodes: int = 1,
+    max_steps: int = EPISODE_STEPS,
+    task: Task | None = None,
+) -> Trace:
+    """Return the trace of the first episodes of one training run, with the Q table after each step.
+
+    Arguments and errors are those of `train`; episodes * max_steps * n_states is limited to 12.8
+    million.
+    """
+    task, max_steps = arguments.checked_run(world, task, max_steps, learns=True)
+    episodes = checked_whole("episodes", episodes)
+    several = arguments.checked_configs(config, task)
+    if len(several) > 1:
+        raise AntsError(f"config has {len(several)} configurations; pass a single one.")
+    _check_length(episodes * max_steps, min(MAX_ROLLOUT_STEPS, MAX_TABLE_ROWS // task.n_states))
+    seeds = arguments.checked_seeds_for(seed, ()).tolist()
+    runs = Runs.learning(world, task, max_steps, several, seeds)
+    before = runs.state.q[:, 0, :, :N_ACTIONS].copy()
+    tables = np.empty((episodes * max_steps, *runs.state.q.shape[2:]), dtype=np.float32)
+    (steps,) = runs.record(episodes, tables=tables)
+    n = len(steps["states"])
+    after = tables[:n, :, :N_ACTIONS]
+    values = np.concatenate([before, after[:-1]])[np.arange(n), steps["states"]]
+    made_by = RolloutArguments(world, task, seeds[0], max_steps, config=several[0])
+    more = {"q_values": values, "td_errors": steps["td_errors"], "tables": after}
+    return _trace(world, steps, **more, arguments=made_by)
+
+
+def _check_length(steps: int, most: int) -> None:
+    """Raise AntsError if a trace would be too long."""
+    if steps > most:
+        raise AntsError(
+            f"episodes * max_steps is {steps}; a trace has at most {most} steps, so reduce one of "
+            "them."
+        )
+
+
+def _trace(world: World, steps: dict[str, np.ndarray], **more: Any) -> Trace:
+    """Return the trace of recorded steps."""
+    columns: dict[str, Any] = {name: steps[name] for name in TRACE}
+    columns["cells"] = world.grid.cells(columns["cells"])
+    columns["terminated"] = columns["terminated"].astype(bool)
+    return Trace(**columns, **more)

@@ -1,4 +1,4 @@
-"""Observations of ants, one file each, and their registry."""
+"""Observations of ants, and their registry."""
 
 from taichi_ants.task.observations.observation import Observation
 from taichi_ants.task.observations.registry import get, names, register

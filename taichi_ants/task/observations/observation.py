@@ -78,7 +78,6 @@ class Observation:
 
 
 def of_codes(
-    name: str,
     encode: Callable[[Any], int],
     names: tuple[str, str] = CELL_LETTERS,
     cells: tuple[int, ...] = AHEAD,
@@ -89,11 +88,9 @@ def of_codes(
 
     `names` has a letter for each code, for an ant without food and with food.
     """
-    base, n = len(names[0]), len(cells)
-    shape = 2, *[base] * n
-    return Observation(
-        name, 2 * base**n, encode, cells, name_of_codes(n, *names), summary, letters, shape
-    )
+    base, n, name = len(names[0]), len(cells), encode.__name__
+    name_of, shape = name_of_codes(n, *names), (2, *[base] * n)
+    return Observation(name, 2 * base**n, encode, cells, name_of, summary, letters, shape)
 
 
 # The package's `__init__` adds the built-in ones.

@@ -1,7 +1,7 @@
 """The registry of observations.
 
-To add one to the package, write a file in this folder and add it to `BUILT_IN`. To add your own
-observation, call `register` from a plugin file.
+To add one to the package, write a function in `built_in.py` and add a line to `BUILT_IN`. To add
+your own observation, call `register` from a plugin file.
 """
 
 from __future__ import annotations
@@ -10,17 +10,10 @@ import inspect
 import math
 
 from taichi_ants.errors import AntsError, checked_whole, expect, shown
-from taichi_ants.task.observations.ants import ANTS
-from taichi_ants.task.observations.ants_seen import ANTS_SEEN
-from taichi_ants.task.observations.five_cells import FIVE_CELLS
+from taichi_ants.task.observations.built_in import BUILT_IN
 from taichi_ants.task.observations.observation import AHEAD, OBSERVATIONS, Observation
-from taichi_ants.task.observations.paper import PAPER
-from taichi_ants.task.observations.queues import QUEUES
-from taichi_ants.task.observations.six_cells import SIX_CELLS
-from taichi_ants.task.observations.trail_levels import TRAIL_LEVELS
 from taichi_ants.task.observations.trial import try_in_python
 
-BUILT_IN = (PAPER, FIVE_CELLS, SIX_CELLS, TRAIL_LEVELS, ANTS_SEEN, ANTS, QUEUES)
 OBSERVATIONS.built_in = {observation.name: observation for observation in BUILT_IN}
 get, names = OBSERVATIONS.get, OBSERVATIONS.names
 

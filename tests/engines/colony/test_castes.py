@@ -196,27 +196,3 @@ def test_numbers_of_castes_change_in_an_episode():
 def test_what_does_not_fit_is_refused(make, says):
     with pytest.raises(AntsError, match=says):
         make()
-
-
-@pytest.mark.parametrize(
-    ("rules", "says"),
-    [
-        ({"castes": {"a": {"share": 0.3}}}, "add up to 0.3; they must add up to 1"),
-        ({"castes": {"a": {"share": 0.7}, "b": {"share": 0.7}}}, "add up to 1.4"),
-        ({"castes": {"a": {"share": 1, "ants": 2}}}, "give one of them"),
-        ({"castes": {"a": {"threshold": 3}}}, "leave it out unless `task.labour.rule`"),
-        ({"labour": "thresholds"}, "ants have no thresholds; add a caste"),
-        ({"castes": {"a": {"lays": "trail, home"}}}, "it must be one of all, none, trail"),
-        ({"castes": {"a": {"k": 2}}}, "because `task.choice.rule` is 'greedy'"),
-        ({"castes": {"a": {"homing_cue": "home"}}}, "it must be one of compass, trail"),
-        ({"castes": {"a": {"threshold": -1}}}, r"`task\.castes\.a\.threshold\.value` is -1"),
-        (
-            {"castes": {"a": {"threshold": {"distribution": "uniform", "value": 1, "spread": 2}}}},
-            "it must be at most the value, 1.0",
-        ),
-        ({"castes": {str(k).join("ab"): {} for k in range(17)}}, "at most 16"),
-    ],
-)
-def test_wrong_castes_are_named(rules, says):
-    with pytest.raises(AntsError, match=says):
-        Task(**rules)

@@ -9,6 +9,7 @@ import plain_runs
 import pytest
 from plain_runs import train_with_tables
 from random_choices import NO_NOISE, NOISE, random_choice, random_noise
+from random_colonies import random_task
 from random_rewards import random_rewards
 from random_worlds import random_world
 
@@ -21,8 +22,7 @@ from taichi_ants import (
     train,
 )
 from taichi_ants.settings import declared
-from taichi_ants.task import Pheromone, Task, observations
-from taichi_ants.task.constants import DEPOSIT_LEVEL
+from taichi_ants.task import Task, observations
 from taichi_ants.task.events import Event
 from taichi_ants.worlds import paper
 
@@ -76,35 +76,16 @@ def random_config(seed: int, learner: str) -> TrainingConfig:
     )
 
 
-def random_task(
+def drawn_task(
     seed: int,
     observation: str = "paper",
     deposit: str = "set",
     choice: str = "greedy",
     noise: str = NO_NOISE,
 ) -> Task:
-    """A task that independent runs can have."""
+    rules = {"choice": random_choice(seed, choice), "noise": random_noise(seed, noise)}
     rng = np.random.default_rng([seed, 2])
-    evaporation, level = str(rng.choice(["linear", "none"])), int(rng.choice([1, 7, 250]))
-    pheromone = Pheromone(
-        evaporation=evaporation,
-        deposit=deposit,
-        level=DEPOSIT_LEVEL if deposit == "none" else level,
-        cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
-        slope=int(rng.choice([1, 10, 100])) if deposit == "fading" else None,
-        view="strongest" if deposit == "fading" else "half",
-    )
-    return Task(
-        observation=observation,
-        rewards=random_rewards(seed),
-        pheromone=pheromone,
-        delivery=str(rng.choice(DELIVERIES)),
-        turns_at_queen=bool(rng.random() < 0.3),
-        evaporation_in_training=bool(rng.random() < 0.7),
-        evaporation_in_evaluation=bool(rng.random() < 0.7),
-        choice=random_choice(seed, choice),
-        noise=random_noise(seed, noise),
-    )
+    return random_task(rng, deposit, random_rewards(seed), observation=observation, **rules)
 
 
 def assert_equal_steps(world, config, seed, episodes, max_steps, task):
@@ -135,7 +116,7 @@ def test_every_step_in_random_worlds(learner, observation, deposit):
     delivered = 0
     n_states = observations.get(observation).n_states
     for seed in range(12 if n_states < 1000 else 8):
-        task = random_task(seed, observation, deposit)
+        task = drawn_task(seed, observation, deposit)
         config, world = random_config(seed, learner), random_world(seed)
         plain = assert_equal_steps(world, config, seed - 7, 4, 25, task)
         delivered += sum(plain.deliveries)
@@ -147,7 +128,7 @@ def test_every_step_with_rules_of_choice_and_noise(learner, observation, deposit
     """Actions that slip, and cells that are misread, in training and in rollouts."""
     slipped = misread = 0
     for seed in range(10 if observations.get(observation).n_states < 1000 else 6):
-        task = random_task(seed, observation, deposit, choice, noise)
+        task = drawn_task(seed, observation, deposit, choice, noise)
         config, world = random_config(seed, learner), random_world(seed)
         plain = assert_equal_steps(world, config, seed - 7, 4, 25, task)
         slipped += sum(step.action != step.executed for step in plain.trace)
@@ -180,7 +161,7 @@ def test_whole_trainings_of_a_mixed_sweep():
     """The kernel that trains equals the reference too, and runs do not disturb each other."""
     names = list(learners.registry.BUILT_IN)
     for number, world in enumerate((paper(), random_world(13, 8))):
-        task = random_task(number)
+        task = drawn_task(number)
         configs = [random_config(seed, names[seed % len(names)]) for seed in range(2 * len(names))]
         # Only this one learns from an episode that is cut off.
         configs.append(TrainingConfig("n_step_sarsa", 0.37, 0.9, 0.3, 0.99, n_steps=3))
@@ -204,7 +185,7 @@ def test_rollouts(observation, deposit):
     rng = np.random.default_rng(0)
     for seed in range(10):
         world = random_world(seed + 1000) if seed else paper()
-        task = random_task(seed, observation, deposit)
+        task = drawn_task(seed, observation, deposit)
         table = rng.integers(0, 3, (task.n_states, 5)).astype(np.float32)
         outcome = evaluate(world, table, 4, seed, 40, task, epsilon=0.1)
         for number in range(4):

@@ -19,75 +19,58 @@ from taichi_ants.worlds import paper
 
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
 PLANS = TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=2)
-TABLE = np.zeros((128, 5))
+UNKNOWN = TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99)
+WITH_N = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99, n=7)
+TABLES = np.zeros((3, 128, 5))
 
 
-def says(text, function, *arguments, **options):
-    with pytest.raises(AntsError) as caught:
-        function(*arguments, **options)
-    assert text in str(caught.value)
-    assert str(caught.value).endswith(".")
-    assert "\n" not in str(caught.value)
+def of_seeds(seeds):
+    return [
+        lambda: train(paper(), CONFIG, seeds, 1, 1),
+        lambda: evaluate(paper(), TABLES, 1, seeds),
+    ]
 
 
-def with_more(learner, **more):
-    return TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99, **more)
+def of_table(table):
+    return [lambda: evaluate(paper(), table), lambda: rollout(paper(), table)]
 
 
-@pytest.mark.parametrize(
-    ("configs", "text"),
-    [
-        ([], "configs is []"),
-        ([CONFIG, None], "the configuration is None"),
-        (TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99), "there is no learner 'td_zero'"),
-        (
-            [CONFIG, with_more("sarsa", n=7)],
-            "`training.n` is not a setting of sarsa",
-        ),
-    ],
-)
-def test_configurations(configs, text):
-    says(text, train, paper(), configs, 0, 1, 1)
-
-
-BAD_SEEDS = [
-    ([], "seeds is empty"),
-    (0.5, "a seed is 0.5"),
-    ([[0, 1]], "a seed is [0, 1]"),
-    (2**64, f"a seed is {2**64}; it must lie between"),
-    ([4, 5, 4], "seeds contains 4 more than once"),
-]
-
-
-@pytest.mark.parametrize(("seeds", "text"), BAD_SEEDS)
-def test_seeds(seeds, text):
-    says(text, train, paper(), CONFIG, seeds, 1, 1)
-    says(text, evaluate, paper(), np.zeros((3, 128, 5)), 1, seeds)
+def of_world(world):
+    return [
+        *(lambda: train(world, CONFIG, 0, 1, 1), lambda: trace_training(world, CONFIG)),
+        *(lambda: evaluate(world, TABLES[0]), lambda: rollout(world, TABLES[0])),
+    ]
 
 
 @pytest.mark.parametrize(
-    ("table", "text"),
+    ("calls", "text"),
     [
-        (np.zeros((128, 4)), "q_values has shape (128, 4)"),
-        (np.zeros((0, 128, 5)), "q_values has shape (0, 128, 5)"),
-        (np.full((128, 5), np.nan), "q_values is nan for state 0"),
-        ("policy", "q_values is 'policy'; it must be an array of real numbers"),
-        ([[1, 2], [3]], "q_values is [[1, 2], [3]]; it must be an array of real"),
+        ([lambda: train(paper(), [], 0)], "configs is []"),
+        ([lambda: train(paper(), [CONFIG, None], 0)], "the configuration is None"),
+        ([lambda: train(paper(), UNKNOWN, 0)], "there is no learner 'td_zero'"),
+        ([lambda: train(paper(), WITH_N, 0)], "`training.n` is not a setting of sarsa"),
+        ([lambda: continue_training(None, 2)], "result is None; it must be a TrainingResult"),
+        (of_seeds([]), "seeds is empty"),
+        (of_seeds(0.5), "a seed is 0.5"),
+        (of_seeds([[0, 1]]), "a seed is [0, 1]"),
+        (of_seeds(2**64), f"a seed is {2**64}; it must lie between"),
+        (of_seeds([4, 5, 4]), "seeds contains 4 more than once"),
+        (of_table(np.zeros((128, 4))), "q_values has shape (128, 4)"),
+        (of_table(np.zeros((0, 128, 5))), "q_values has shape (0, 128, 5)"),
+        (of_table(np.full((128, 5), np.nan)), "q_values is nan for state 0"),
+        (of_table("policy"), "q_values is 'policy'; it must be an array of real numbers"),
+        (of_table([[1, 2], [3]]), "q_values is [[1, 2], [3]]; it must be an array of real"),
+        (of_world(None), "world is None; it must be a World"),
+        (of_world("paper"), "world is 'paper'; it must be a World"),
     ],
 )
-@pytest.mark.filterwarnings("ignore:overflow encountered in cast")
-def test_tables(table, text):
-    says(text, evaluate, paper(), table)
-    says(text, rollout, paper(), table)
-
-
-@pytest.mark.parametrize("world", [None, "paper", ((2, 2, 2), (0, 0, 0))])
-def test_worlds(world):
-    text = f"world is {world!r}; it must be a World"
-    says(text, train, world, CONFIG, 0, 1, 1)
-    says(text, evaluate, world, TABLE)
-    says(text, rollout, world, TABLE)
-    says(text, trace_training, world, CONFIG)
+def test_what_is_refused(calls, text):
+    for call in calls:
+        with pytest.raises(AntsError) as caught:
+            call()
+        assert text in str(caught.value)
+        assert str(caught.value).endswith(".")
+        assert "\n" not in str(caught.value)
 
 
 def test_arguments_are_left_as_they_are():
@@ -99,7 +82,6 @@ def test_arguments_are_left_as_they_are():
 
     result = train(paper(), [CONFIG, PLANS], [0, 1], 3, 50)
     kept = {name: array.copy() for name, array in vars(result.state).items()}
-    says("result is None; it must be a TrainingResult", continue_training, None, 2)
     longer = continue_training(result, 2)
     for name, array in kept.items():
         assert np.array_equal(getattr(result.state, name), array)
