@@ -91,8 +91,8 @@ class Stepper:
         # The caller may have reset Taichi, or forked the process.
         runtime.check_on_cpu(runtime.start(), "colonies run")
         if name not in self._launches:
-            from taichi_ants.engines.launch import Launch
             from taichi_ants.engines.colony import kernels, learning
+            from taichi_ants.engines.launch import Launch
 
             variant = kernels.variant(state.model)
             kernel_of = partial(kernels.ticks, variant, state.schedule == "by_chunk")
