@@ -361,7 +361,7 @@ MUTATIONS = [
         COLONY,
     ),
     ("measures/built_in.py", 'ratio(counts["carried"]', 'ratio(counts["moves"]', MEASURES),
-    ("measures/paths.py", "float(reached.min()) - 1)", "float(reached.min()))", MEASURES),
+    ("measures/built_in.py", "float(steps - 1)", "float(steps)", MEASURES),
     ("measures/built_in.py", "level, n in pairs)", "level, _ in pairs for n in (1,))", MEASURES),
     ("measures/built_in.py", "log(len(levels)))", "log(len(levels) + 1))", MEASURES),
     ("measures/built_in.py", "(share - mean) ** 2", "abs(share - mean)", MEASURES),

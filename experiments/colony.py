@@ -43,7 +43,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.analysis import style
     from taichi_ants.analysis.bounds.limits import limits_of
     from taichi_ants.analysis.drawings import drawings
-    from taichi_ants.analysis.findings import seeds_in_words
     from taichi_ants.analysis.tables import plain_text, sentence
     from taichi_ants.errors import count
     from taichi_ants.learners.policies import save_policy
@@ -356,7 +355,7 @@ def colony_page(results: Results, **parts: Any) -> str:
     """Return the page as HTML; `parts` are drawings, players, facts and files."""
     rows, judged = results
     world_kinds = {row.condition.world_kind for row in rows}
-    seeds = seeds_in_words(rows[0].seeds)
+    seeds = study.seeds_in_words(rows[0].seeds)
     return page.fill(
         Path(__file__).with_name("colony.html"),
         title="Which rules and which training make a colony deliver more?",

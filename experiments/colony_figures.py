@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import colony_findings as study
 
 from taichi_ants.analysis import style
-from taichi_ants.analysis.findings import seeds_in_words
 from taichi_ants.analysis.sweeps import draw_lines
 from taichi_ants.analysis.tables import sentence
 from taichi_ants.measures.finished import COLONY
@@ -108,7 +107,11 @@ def _lines(title: str, designs: Sequence[study.Design], rows: Rows) -> Figure | 
 
 def _spread(rows: Rows) -> str:
     seeds = rows[0].seeds
-    means = f"Means over {seeds_in_words(seeds)}, with 95 % intervals" if seeds > 1 else "One seed"
+    means = (
+        f"Means over {study.seeds_in_words(seeds)}, with 95 % intervals"
+        if seeds > 1
+        else "One seed"
+    )
     return f"{means}. Exploration rate {study.EVALUATION_EPSILON:g}."
 
 

@@ -23,7 +23,6 @@ from taichi_ants.analysis.findings import (
     Verdict,
     above,
     judge,
-    seeds_in_words,
     weakest,
 )
 from taichi_ants.analysis.statistics import Estimator
@@ -271,6 +270,11 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
         note = "Mean, its 95 % interval, and the worst seed."
         tables.append(Table(title, headers, cells, [note]))
     return tables
+
+
+def seeds_in_words(seeds: int) -> str:
+    """Return "20 seeds", for example, with a warning if they are fewer than `LEAST_SEEDS`."""
+    return count(seeds, "seed") + (", too few for a verdict" if seeds < LEAST_SEEDS else "")
 
 
 def _basis(rows: Sequence[ConditionRow]) -> str:

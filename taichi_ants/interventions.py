@@ -136,7 +136,7 @@ class Intervention(ShorthandSettings):
         if isinstance(cells, str):
             world.region(cells)
         else:
-            indices(world.grid, cells)
+            flat_indices(world.grid, cells)
         if (nest := getattr(self, "nest", None)) is not None and nest >= world.n_nests:
             raise AntsError(
                 f"`{self.path}.nest` is {nest}, but the world has {count(world.n_nests, 'nest')}, "
@@ -455,37 +455,28 @@ def from_dict(facts: Any) -> Intervention:
     return INTERVENTIONS[name].from_dict(settings)
 
 
-def flat_index(grid: AxialGrid, cell: Any) -> int:
-    """Return the flat index of a cell or of a flat index; AntsError if it does not exist."""
-    flat = int(cell if np.ndim(cell) == 0 else grid.index(cell))
-    if not 0 <= flat < grid.size or not grid.exists[flat]:
-        raise AntsError(
-            f"the cell {cell} is outside the world; choose a cell within the ranges {grid.ranges}."
-        )
+def flat_indices(grid: AxialGrid, cells: Sequence[Any]) -> list[int]:
+    """Return the flat indices of cells or of flat indices; AntsError if one does not exist."""
+    flat = [int(cell if np.ndim(cell) == 0 else grid.index(cell)) for cell in cells]
+    for cell, index in zip(cells, flat, strict=True):
+        if not 0 <= index < grid.size or not grid.exists[index]:
+            raise AntsError(
+                f"the cell {cell} is outside the world; choose a cell within the ranges "
+                f"{grid.ranges}."
+            )
     return flat
-
-
-def indices(grid: AxialGrid, cells: Sequence[Any]) -> np.ndarray:
-    """Return the flat indices of cells or of flat indices, without duplicates.
-
-    AntsError if a cell does not exist.
-    """
-    return np.array(list(dict.fromkeys(flat_index(grid, cell) for cell in cells)), np.int64)
 
 
 def _checked_cells(path: str, cells: Sequence) -> tuple:
     """Return cells as triples or flat indices; AntsError if one is neither."""
-    cells_found: list[Any] = []
+    name, checked = f"a cell of `{path}`", []
     for cell in cells:
         parts = entries_of(cell)
         if parts is not None and len(parts) != 3:
             raise AntsError(
                 f"`{path}` has the cell {shown(cell)}; a cell is three whole numbers [x, y, z]."
             )
-        name = f"a cell of `{path}`"
-        cells_found.append(
-            whole(name, cell) if parts is None else tuple(whole(name, x) for x in parts)
-        )
-    if not cells_found:
+        checked.append(whole(name, cell) if parts is None else tuple(whole(name, x) for x in parts))
+    if not checked:
         raise AntsError(f"`{path}` is empty; give at least one cell.")
-    return tuple(cells_found)
+    return tuple(checked)

@@ -13,23 +13,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
+from taichi_ants import interventions as language
 from taichi_ants import measures
 from taichi_ants.errors import AntsError, entries_of, shown
-from taichi_ants.interventions import (
-    AddAnts,
-    Clear,
-    Intervention,
-    Move,
-    Place,
-    RemoveAnts,
-    SetAnts,
-    SetEpsilon,
-    SetLearningRate,
-    SetPolicy,
-    SetTask,
-    SetTrail,
-    ShorthandSettings,
-)
+from taichi_ants.interventions import Intervention, ShorthandSettings
 from taichi_ants.settings import Setting
 from taichi_ants.task.constants import MAX_STEPS
 
@@ -41,17 +28,19 @@ Interval = Annotated[int, Setting(unit="ticks", least=1, most=MAX_STEPS)]
 class ProtocolEvent(ShorthandSettings):
     """The interventions of an event, in the order in which they are applied."""
 
-    remove_ants: Annotated[RemoveAnts | None, Setting("ants to remove")] = None
-    add_ants: Annotated[AddAnts | None, Setting("ants to add")] = None
-    ants: Annotated[SetAnts | None, Setting("new number of ants")] = None
-    clear: Annotated[Clear | None, Setting("cells from which to remove rock and food")] = None
-    move: Annotated[Move | None, Setting("rock, food or queen to move")] = None
-    place: Annotated[Place | None, Setting("rock, food or queen to place")] = None
-    trail: Annotated[SetTrail | None, Setting("trail to lay or to clear")] = None
-    task: Annotated[SetTask | None, Setting("settings of the task to change")] = None
-    epsilon: Annotated[SetEpsilon | None, Setting("new exploration rate")] = None
-    learning_rate: Annotated[SetLearningRate | None, Setting("new learning rate")] = None
-    policy: Annotated[SetPolicy | None, Setting("policy to follow")] = None
+    remove_ants: Annotated[language.RemoveAnts | None, Setting("ants to remove")] = None
+    add_ants: Annotated[language.AddAnts | None, Setting("ants to add")] = None
+    ants: Annotated[language.SetAnts | None, Setting("new number of ants")] = None
+    clear: Annotated[language.Clear | None, Setting("cells from which to remove rock and food")] = (
+        None
+    )
+    move: Annotated[language.Move | None, Setting("rock, food or queen to move")] = None
+    place: Annotated[language.Place | None, Setting("rock, food or queen to place")] = None
+    trail: Annotated[language.SetTrail | None, Setting("trail to lay or to clear")] = None
+    task: Annotated[language.SetTask | None, Setting("settings of the task to change")] = None
+    epsilon: Annotated[language.SetEpsilon | None, Setting("new exploration rate")] = None
+    learning_rate: Annotated[language.SetLearningRate | None, Setting("new learning rate")] = None
+    policy: Annotated[language.SetPolicy | None, Setting("policy to follow")] = None
 
     def check(self) -> None:
         super().check()

@@ -101,17 +101,19 @@ class Snapshot(Record):
     def distances(self) -> np.ndarray:
         """Steps from each cell to the nearest queen, without obstacles, int32 (grid.size,)."""
         queens = self.grid.cells(np.flatnonzero(self.ground == QUEEN))
-        return np.min([self.grid.distances(tuple(one)) for one in queens.tolist()], axis=0)
+        return np.min([self.grid.distances(tuple(queen)) for queen in queens.tolist()], axis=0)
 
 
-def same(one: object, other: object) -> bool:
+def same(value: object, other: object) -> bool:
     """Return whether two values, arrays or not, are equal; NaN equals NaN in arrays."""
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(same(one[name], other[name]) for name in one)
-    if not isinstance(one, np.ndarray) or not isinstance(other, np.ndarray):
-        return not isinstance(one, np.ndarray) and type(one) is type(other) and one == other
-    floats = one.dtype.kind == "f"
-    return one.dtype == other.dtype and np.array_equal(one, other, equal_nan=floats)
+    if isinstance(value, dict) and isinstance(other, dict):
+        return value.keys() == other.keys() and all(
+            same(value[name], other[name]) for name in value
+        )
+    if not isinstance(value, np.ndarray) or not isinstance(other, np.ndarray):
+        return not isinstance(value, np.ndarray) and type(value) is type(other) and value == other
+    floats = value.dtype.kind == "f"
+    return value.dtype == other.dtype and np.array_equal(value, other, equal_nan=floats)
 
 
 def _described(value: object) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +10,8 @@ import numpy as np
 from taichi_ants import learners, rules, runtime, worlds
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, checked_whole, listing
-from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.records import Snapshot
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.rules import Rule
 from taichi_ants.rules.inputs import LABOUR
@@ -136,43 +136,38 @@ def _task(rule: Rule, seed: int) -> Task:
         if least is not None and most is not None and rng.random() < 0.5:
             value = float(rng.uniform(least, most))
             numbers[setting.name] = round(value) if setting.kind is int else value
-    settings: dict = {"rules": {rule.name: numbers}, "evaporation_in_training": True}
-    settings["fields"] = _fields(rule.fields)
-    settings["traffic"] = ("blocking", "following")[drawn]
+    settings: dict = {"rules": {rule.name: numbers}}
     if any(name in rule.inputs for name in LABOUR):
         threshold = {"distribution": "uniform", "value": 5.0, "spread": 5.0}
         settings |= {"labour": "thresholds", "castes": {"ants": {"threshold": threshold}}}
-    pheromone: dict = {"diffusion": 0.1 * drawn}
     if rule.kind == "choice":
-        settings["choice"] = {"rule": rule.name}
-        settings["noise"] = {"misread": 0.2 * drawn}
+        settings |= {"choice": {"rule": rule.name}, "noise": {"misread": 0.2 * drawn}}
     elif rule.kind == "reward":
-        settings["reward"] = rule.name
-        settings["homing_cue"] = ("compass", "trail")[drawn]
+        settings |= {"reward": rule.name, "homing_cue": ("compass", "trail")[drawn]}
     else:
-        pheromone[rule.kind] = rule.name
-        field = {"deposited_when": _LAID[seed % len(_LAID)], rule.kind: rule.name}
-        settings["fields"]["second"] = field
-    return Task().replace(**settings, pheromone=pheromone)
+        second = {"deposited_when": _LAID[seed % len(_LAID)], rule.kind: rule.name}
+        settings |= {"pheromone": {rule.kind: rule.name}, "fields": {"second": second}}
+    return _common(rule.fields, drawn).replace(**settings)
 
 
 def _task_of(observation: Observation, seed: int) -> Task:
     """Return a drawn task with an observation; kernels are compiled for two tasks only."""
     drawn = seed % 2
-    return Task().replace(
+    return _common(observation.reads, drawn).replace(
         observation=observation.name,
-        fields=_fields(observation.reads),
-        evaporation_in_training=True,
-        traffic=("blocking", "following")[drawn],
         homing_cue=("compass", "trail")[drawn],
         noise={"misread": 0.2 * drawn},
-        pheromone={"diffusion": 0.1 * drawn},
     )
 
 
-def _fields(names: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Return further pheromones with these names."""
-    return {name: {"deposited_when": "always"} for name in names if name != TRAIL}
+def _common(fields: Iterable[str], drawn: int) -> Task:
+    """Return a task with further pheromones of these names."""
+    return Task().replace(
+        fields={name: {"deposited_when": "always"} for name in fields if name != TRAIL},
+        evaporation_in_training=True,
+        traffic=("blocking", "following")[drawn],
+        pheromone={"diffusion": 0.1 * drawn},
+    )
 
 
 def _world(seed: int) -> World:
@@ -216,7 +211,7 @@ def _difference(colony: Colony, plain: ReferenceColony) -> str:
         "actions": (colony.actions[0, order], [ant.action for ant in ants]),
         "events": (colony.events[0, order], [ant.event for ant in ants]),
         "rewards": (colony.rewards[0, order], [ant.reward for ant in ants]),
-        **{f"levels of {name}": _levels(grid, ours.fields, plain, name) for name in ours.fields},
+        **{f"levels of {name}": levels for name, levels in _levels(ours, plain).items()},
         "action values": (colony.q_values[0], plain.q_values),
     }
     for what, (kernel, twin) in pairs.items():
@@ -227,11 +222,11 @@ def _difference(colony: Colony, plain: ReferenceColony) -> str:
     return ""
 
 
-def _levels(
-    grid: AxialGrid, fields: Mapping[str, np.ndarray], plain: ReferenceColony, name: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the levels of a pheromone in all cells: those of kernels, and of the reference."""
+def _levels(ours: Snapshot, plain: ReferenceColony) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return the levels of each pheromone in all cells: those of kernels, and of the reference."""
     cells = list(plain.world.ground)
-    places = grid.index(np.array(cells, np.int64).reshape(-1, 3))
-    trail = plain.world.pheromones[name]
-    return fields[name][places], np.array([trail.level(cell) for cell in cells])
+    places = ours.grid.index(np.array(cells, np.int64).reshape(-1, 3))
+    return {
+        name: (ours.fields[name][places], np.array([trail.level(cell) for cell in cells]))
+        for name, trail in plain.world.pheromones.items()
+    }

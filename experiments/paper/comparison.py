@@ -13,9 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from taichi_ants.analysis.behaviour import BEHAVIOURS
 from taichi_ants.learners import TrainingConfig, label
 from taichi_ants.task import Task
 
+NAMES = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  # in columns and file names
+# For reports. Of an episode without a delivery, the second half counts.
+DEFINITIONS = (
+    "the episode ends with a delivery",
+    "without food, at least every fourth step leads onto a trail",
+    "with food, at least every fourth step leads nearer to the queen",
+    "none of these",
+)
 PAPER_WORLD = "the paper's"  # its numbers and claims apply to this world only
 
 
@@ -172,3 +181,9 @@ FACTORS: dict[str, tuple[float, float]] = {
     "epsilon_decay": (0.99, 0.995),
 }
 GRID: tuple[GridPoint, ...] = tuple(GridPoint(*values) for values in product(*FACTORS.values()))
+
+
+def counts(behaviours: np.ndarray) -> dict[int, int]:
+    """Return the number of runs by behaviour, in the order of `BEHAVIOURS`, without zeros."""
+    number_of = np.bincount(np.ravel(behaviours), minlength=len(BEHAVIOURS)).tolist()
+    return {code: number for code, number in enumerate(number_of) if number}

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paper.baselines import Baseline
-from paper.comparison import FIGURE_1, Comparison, Variant
+from paper.comparison import FIGURE_1, Comparison, Variant, counts
 from paper.table2 import shown_position
 from taichi_ants.analysis import style
-from taichi_ants.analysis.behaviour import BEHAVIOURS, counts
+from taichi_ants.analysis.behaviour import BEHAVIOURS
 from taichi_ants.analysis.drawings import Drawing, drawings
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import BLUE, COLOURS, INK, ORANGE, WINE
@@ -141,13 +141,7 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
             for row, marker in zip(baselines, cycle("osD^vph")):
                 counts_here = setting == "terminates" or row.baseline != "optimal policy"
                 if row.return_mean is not None and counts_here:
-                    axis.plot(
-                        row.deliveries_mean,
-                        row.return_mean,
-                        marker,
-                        label=row.label,
-                        **look,
-                    )
+                    axis.plot(row.deliveries_mean, row.return_mean, marker, label=row.label, **look)
         axes[0].set_ylabel("Return (reward per episode, last 50)")
         style.frame(
             figure,

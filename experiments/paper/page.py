@@ -15,10 +15,10 @@ from paper import comparison as paper
 from paper import figures, process, report
 from paper.baselines import Baseline
 from paper.claims import Audit, headlines
-from paper.comparison import Comparison
+from paper.comparison import DEFINITIONS, Comparison, counts
 from paper.table2 import Line, example_name, summarise_behaviours
 from taichi_ants import files
-from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
+from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
@@ -93,7 +93,7 @@ def begin(
     first: dict[int, tuple[Example, Episode]] = {}
     for example, episode in zip(examples, played, strict=True):
         first.setdefault(int(comparison.behaviours[example.row, example.run]), (example, episode))
-    done, captions = counts(comparison.behaviours), dict[Any, Any]()
+    done, captions = counts(comparison.behaviours), dict[Any, tuple[str, str]]()
     for code, (example, episode) in sorted(first.items()):
         _, variant, grid = comparison.rows[example.row]
         whose = (
@@ -106,7 +106,7 @@ def begin(
         calls[code] = process.begin(record_trace, episode.trace, BEHAVIOURS[code])
         if code == DELIVERS:
             title, task = f"{variant.label}: policy", example.point.task
-            captions["sheet"] = (f"The policy of an ant: {whose}",)
+            captions["sheet"] = "", f"The policy of an ant: {whose}"
             calls["sheet"] = process.begin(policy_sheet, example.q_values, title, task=task)
     calls["drawings"] = draw(figures.for_page, comparison, baselines)
 
@@ -114,7 +114,7 @@ def begin(
         with progress_bar("pictures") as progress:
             results = process.results_of(calls, progress)
         players = [Player(*captions[code], results[code]) for code in sorted(first)]
-        sheet = Picture(*captions["sheet"], results["sheet"]) if "sheet" in results else None
+        sheet = Picture(captions["sheet"][1], results["sheet"]) if "sheet" in results else None
         return Seen(results["drawings"], players, sheet)
 
     return wait

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
@@ -41,7 +41,7 @@ def begin(call: Callable[..., Any], *given: Any, **named: Any) -> Begun:
     return lambda: here() if future.cancel() else future.result()
 
 
-def results_of(calls: Mapping[Any, Begun], progress: Callable[[float], None]) -> dict[Any, Any]:
+def results_of(calls: dict[Any, Begun], progress: Callable[[float], None]) -> dict[Any, Any]:
     """Return the results of calls that have begun; raises an error of one after all have ended.
 
     The last ones come first, because the second process has not begun them.

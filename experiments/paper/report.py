@@ -8,12 +8,9 @@ from typing import Any
 
 from paper.baselines import Baseline
 from paper.claims import Audit, headlines, tallies
-from paper.comparison import GREEDY_RETURN, GREEDY_STEPS, Comparison
-from paper.table2 import (
-    FIGURES,
-    Line,
-)
-from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, counts
+from paper.comparison import DEFINITIONS, GREEDY_RETURN, GREEDY_STEPS, Comparison, counts
+from paper.table2 import FIGURES, Line
+from taichi_ants.analysis.behaviour import BEHAVIOURS
 from taichi_ants.analysis.statistics import Estimator
 from taichi_ants.analysis.tables import (
     MISSING,
@@ -74,8 +71,13 @@ def behaviour_counts(comparison: Comparison) -> Table:
     return Table("", ("Behaviour of final policies", *settings), rows)
 
 
+def is_apart(one: Estimator) -> bool:
+    """Return whether the mean lies outside of the interval of the IQM."""
+    return one.mean < one.iqm_ci_low or one.mean > one.iqm_ci_high
+
+
 def _mean(one: Estimator) -> str:
-    return number(one.mean) + (f" {APART}" if one.apart else "")
+    return number(one.mean) + (f" {APART}" if is_apart(one) else "")
 
 
 def _glance(lines: Sequence[Line]) -> Table:
@@ -99,7 +101,7 @@ def _glance(lines: Sequence[Line]) -> Table:
         "Return and food: last 50 episodes; steps: all. IQM: interquartile mean. Best run: "
         "highest return of all configurations, one run each."
     ]
-    if any(line.summary.estimates["return_last50"].apart for line in shown):
+    if any(is_apart(line.summary.estimates["return_last50"]) for line in shown):
         notes.append(f"{APART} outliers pull the mean away from the IQM.")
     if any(line.summary.mixed for line in shown):
         notes.append(MIXED)
@@ -128,7 +130,7 @@ def figure_tables(lines: Sequence[Line], comparison: Comparison) -> list[Table]:
             estimator, best = line.summary.estimates[name], line.best_run[name]
             cells = [
                 *(line.label, line.delivery),
-                _spread(name, *estimator[:3], mark=f" {APART}" if estimator.apart else ""),
+                _spread(name, *estimator[:3], mark=f" {APART}" if is_apart(estimator) else ""),
                 _spread(name, *estimator[3:6]),
                 _spread(name, best["median"], best["low"], best["high"]),
                 number(line.of_paper(name), 2 if "deliver" in name else 1),
@@ -157,7 +159,7 @@ def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
         "IQM: interquartile mean, the mean of the middle half of the runs.",
         "Best run: highest return of all configurations, one run each: median, [95 % range].",
     ]
-    if any(line.summary.estimates[name].apart for line in lines for name in FIGURES):
+    if any(is_apart(line.summary.estimates[name]) for line in lines for name in FIGURES):
         notes.append(f"{APART} outliers pull the mean out of the interval of the IQM.")
     if beside:
         notes += [

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from paper.comparison import TABLE_2, Comparison, PaperRow, Row, Variant
-from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
+from paper.comparison import NAMES, TABLE_2, Comparison, PaperRow, Row, Variant, counts
+from taichi_ants.analysis.behaviour import BEHAVIOURS
 from taichi_ants.analysis.statistics import RANDOM_SEED, Estimator, interquartile_mean
 from taichi_ants.analysis.sweeps import centre_columns, centres_of
 from taichi_ants.measures.finished import LONE

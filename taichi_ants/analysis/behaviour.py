@@ -19,14 +19,6 @@ if TYPE_CHECKING:
 # A behaviour is an index into this list.
 BEHAVIOURS = ("delivers", "walks the trail", "circles with food", "other")
 DELIVERS, WALKS, CIRCLES, OTHER = range(len(BEHAVIOURS))
-NAMES = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  # in columns and file names
-# For reports. Of an episode without a delivery, the second half counts.
-DEFINITIONS = (
-    "the episode ends with a delivery",
-    "without food, at least every fourth step leads onto a trail",
-    "with food, at least every fourth step leads nearer to the queen",
-    "none of these",
-)
 _PAID_SHARE = 0.25
 
 
@@ -53,9 +45,3 @@ def classify(trace: Trace, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
     behaviours = np.select([delivers, walks, circles], [DELIVERS, WALKS, CIRCLES], OTHER)
     returns = np.bincount(episode, weights=trace.rewards).astype(np.int64)
     return behaviours.astype(np.int8), returns
-
-
-def counts(behaviours: np.ndarray) -> dict[int, int]:
-    """Return the number of runs by behaviour, in the order of `BEHAVIOURS`, without zeros."""
-    number_of = np.bincount(np.ravel(behaviours), minlength=len(BEHAVIOURS)).tolist()
-    return {code: number for code, number in enumerate(number_of) if number}

@@ -176,11 +176,6 @@ def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
     return [finding(place, contrast.uses_iqm) for place, contrast in enumerate(contrasts)]
 
 
-def seeds_in_words(seeds: int) -> str:
-    """Return "20 seeds", for example, with a warning if they are fewer than `LEAST_SEEDS`."""
-    return count(seeds, "seed") + (", too few for a verdict" if seeds < LEAST_SEEDS else "")
-
-
 def means_in_words(seeds: int) -> str:
     """Return "Means over 20 seeds with 95 % intervals", for example, for captions."""
     few = f" (too few for these: use {LEAST_SEEDS} or more)" if seeds < LEAST_SEEDS else ""

@@ -17,7 +17,7 @@ import numpy as np
 
 from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import means_in_words
-from taichi_ants.analysis.statistics import RESAMPLES, bootstrap_interval
+from taichi_ants.analysis.statistics import bootstrap_interval, estimates
 from taichi_ants.analysis.tables import Table, plain_text, sentence
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.measures.tidy import Measured, Tidy, checked_measure, last_rows, parts_of
@@ -111,15 +111,8 @@ def compare(
         AntsError: The seeds differ, a result does not have the measure or the configuration, or no
             seed has a value in both results.
     """
-    expect("a", a, Tidy)
-    expect("b", b, Tidy)
-    tables = a.measured(), b.measured()
-    if tables[0].seeds != tables[1].seeds:
-        raise AntsError(
-            f"the seeds of a are {shown(tables[0].seeds)}, those of b are "
-            f"{shown(tables[1].seeds)}; compare results with the same seeds in the same order."
-        )
     values = []
+    tables = _tables_of({"a": a, "b": b}).values()
     for table, number in zip(tables, configurations, strict=True):
         most = len(table.groups) - 1
         group = checked_whole("a configuration", number, least=0, most=max(0, most))
@@ -157,7 +150,7 @@ def summary(result: Tidy, last: int | None = None) -> Summary:
         raise AntsError(_NO_NUMBERS)
     for name in table.values:
         for group, values in zip(table.groups, of_seeds(table, name, last), strict=True):
-            mean, low, high = (float(bound[0]) for bound in _means(values[None]))
+            ((mean, low, high, *_),) = estimates(values[None], uses_iqm=False)
             rows.append({
                 "configuration": group, "measure": name, "unit": table.units.get(name, ""),
                 "seeds": int(np.count_nonzero(~np.isnan(values))),
@@ -188,9 +181,7 @@ def plot(
         expect("path", path, str, Path)
         check_one_of("the suffix of path", Path(path).suffix, (".png",))
     named = results if isinstance(results, Mapping) else {"result": results}
-    for name, result in named.items():
-        expect(name, result, Tidy)
-    table = _together({name: result.measured() for name, result in named.items()})
+    table = _together(_tables_of(named))
     names = [part for name in measures for part in parts_of(table, name)] or list(table.plotted)
     if not names:
         raise AntsError(_NO_NUMBERS)
@@ -207,7 +198,8 @@ def plot(
         for axes, name in zip(panels, names, strict=True):
             for number, (x, values) in enumerate(curves(table, name, across)):
                 colour = style.COLOURS[number % len(style.COLOURS)]
-                mean, low, high = _means(values, _RESAMPLES)
+                rows = estimates(values, uses_iqm=False, resamples=_RESAMPLES)
+                mean, low, high = np.array([row[:3] for row in rows]).reshape(-1, 3).T
                 marker = "o" if len(x) < 2 else None
                 axes.plot(
                     x, mean, color=colour, marker=marker, label=style.label(table.groups[number])
@@ -227,20 +219,27 @@ def plot(
     return figure
 
 
+def _tables_of(results: Mapping[str, Tidy]) -> dict[str, Measured]:
+    """Return the tables of results by name; AntsError unless all have the same seeds."""
+    for name, result in results.items():
+        expect(name, result, Tidy)
+    tables = {name: result.measured() for name, result in results.items()}
+    first, *others = tables
+    for name in others:
+        if tables[name].seeds != tables[first].seeds:
+            raise AntsError(
+                f"the seeds of {name!r} are {shown(tables[name].seeds)}, those of {first!r} are "
+                f"{shown(tables[first].seeds)}; use the same seeds in the same order."
+            )
+    return tables
+
+
 def _together(tables: Mapping[str, Measured]) -> Measured:
     """Return named tables as one, whose configurations are those of all tables."""
-    if not tables:
-        raise AntsError("there are no results; give at least one.")
-    first = next(iter(tables.values()))
-    if len(tables) == 1:
-        return first
-    for name, table in tables.items():
-        if table.seeds != first.seeds:
-            raise AntsError(
-                f"the seeds of {name!r} are {shown(table.seeds)}, those of {next(iter(tables))!r} "
-                f"are {shown(first.seeds)}; draw results with the same seeds in the same order."
-            )
     every = tables.values()
+    first = next(iter(every))
+    if len(every) == 1:
+        return first
     common = [name for name in first.values if all(name in table.values for table in every)]
     groups = [f"{name} {group}".strip() for name, table in tables.items() for group in table.groups]
     ends = list(itertools.accumulate(len(table.groups) for table in every))
@@ -305,21 +304,3 @@ def curves(table: Measured, measure: str, across: str) -> Iterator[tuple[np.ndar
                 sums[begin:end, seed] += value
                 counts[begin:end, seed] += 1
         yield x, np.divide(sums, counts, out=np.full(sums.shape, math.nan), where=counts > 0)
-
-
-def _means(values: np.ndarray, resamples: int = RESAMPLES) -> tuple[np.ndarray, ...]:
-    """Return the mean and the ends of its interval by row (rows, seeds), without nan."""
-    known = ~np.isnan(values)
-    intervals = np.full((3, len(values)), math.nan)
-    whole = known.all(axis=1)
-    if whole.any():
-        intervals[:, whole] = (
-            values[whole].mean(axis=1),
-            *bootstrap_interval(values[whole], resamples=resamples),
-        )
-    for row in np.flatnonzero(known.any(axis=1) & ~whole):
-        some = values[row, known[row]][None]
-        intervals[:, row] = np.ravel(
-            [some.mean(axis=1), *bootstrap_interval(some, resamples=resamples)]
-        )
-    return tuple(intervals)

@@ -107,16 +107,13 @@ class Estimator(NamedTuple):
     iqm_ci_high: float = math.nan
     left_out: int = 0
 
-    @property
-    def apart(self) -> bool:
-        """Whether the mean lies outside of the interval of the IQM."""
-        return self.mean < self.iqm_ci_low or self.mean > self.iqm_ci_high
 
-
-def estimates(values: np.ndarray, uses_iqm: bool = True) -> list[Estimator]:
+def estimates(
+    values: np.ndarray, uses_iqm: bool = True, resamples: int = RESAMPLES
+) -> list[Estimator]:
     """Return the estimates of each row of values (rows, seeds), without IQM unless `uses_iqm`."""
     values = np.asarray(values, float)
-    columns = [values.mean(axis=1), *bootstrap_interval(values)]
+    columns = [values.mean(axis=1), *bootstrap_interval(values, resamples=resamples)]
     if uses_iqm:
         columns += [interquartile_mean(values), *bootstrap_interval(values, iqm=True)]
     exact = (without_noise(column, values).tolist() for column in columns)
@@ -124,7 +121,8 @@ def estimates(values: np.ndarray, uses_iqm: bool = True) -> list[Estimator]:
     missing = np.isnan(values)
     for row in np.flatnonzero(missing.any(axis=1)):
         if not missing[row].all():
-            (estimators[row],) = estimates(values[row, ~missing[row]][None], uses_iqm)
+            known = values[row, ~missing[row]][None]
+            (estimators[row],) = estimates(known, uses_iqm, resamples)
         estimators[row] = estimators[row]._replace(left_out=int(missing[row].sum()))
     return estimators
 

@@ -28,7 +28,7 @@ from taichi_ants.studies.command_line import (
     progress_bar,
     whole_number,
 )
-from taichi_ants.studies.interruption import stop_if_noted
+from taichi_ants.studies.interruption import held
 from taichi_ants.studies.plugins import load_plugin
 from taichi_ants.task import Life, queueing
 
@@ -113,11 +113,13 @@ def run(settings: argparse.Namespace) -> None:
             opened.enter_context(_opened(room.url))
 
         def each_turn() -> None:
-            stop_if_noted()
+            if stopped():
+                room.end()
             if room.watched:
                 opened.close()
 
-        room.run(settings.duration, each_turn)
+        with held() as stopped:
+            room.run(settings.duration, each_turn)
     print("Ended.")
 
 

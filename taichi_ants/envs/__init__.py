@@ -16,6 +16,5 @@ register(
     vector_entry_point="taichi_ants.envs.forage:HexForageVectorEnv",
 )
 register(
-    "taichi_ants/HexColony-v0",
-    vector_entry_point="taichi_ants.envs.colony:HexColonyVectorEnv",
+    "taichi_ants/HexColony-v0", vector_entry_point="taichi_ants.envs.colony:HexColonyVectorEnv"
 )

@@ -70,16 +70,11 @@ class ColonyWorlds(Ants):
         self.acted, self.rewards = np.zeros(shape, bool), np.zeros(shape)
         self.events = np.full(shape, Event.NONE, np.int64)
         self.deliveries = np.zeros(shape, np.int64)
-        self._last: dict[str, np.ndarray] = {}
+        self._last: dict[str, np.ndarray] = {}  # at the end of episodes, in mode SAME_STEP
+        # Events and states of the last step, before worlds have begun again.
+        self._results = np.zeros(0, np.uint8), np.zeros(0, np.int32)
 
-    def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
-        """Begin an episode in the worlds `which`, bool (W,).
-
-        `seeds` has an entry for each of the W worlds. A world with a seed is reset completely; None
-        continues its random numbers.
-        """
-        if seeds is None:
-            seeds = [None] * len(which)
+    def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
         new = np.array([seed is not None for seed in seeds]) & which
         if new.any():
             # As for one ant, seeds count modulo 2**64.
@@ -109,33 +104,24 @@ class ColonyWorlds(Ants):
     def advance(
         self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        results = _, terminated, truncated = self._take(actions, waiting)
-        if mode is AutoresetMode.SAME_STEP and (terminated | truncated).any():
-            self._last = self.facts()
-        self._renew(truncated, mode, waiting)
-        return results
-
-    def _take(
-        self, actions: np.ndarray, waiting: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Take a step, and return its rewards, terminations and truncations, (n,)."""
         if self.task.delivery == "terminates":  # the next episode of these ants has begun
             delivered = self.colony.events == Event.DELIVERED
             self.deliveries = np.where(delivered, 0, self.deliveries)
         self.step(actions.reshape(self.acted.shape))
-        truncated = np.repeat(self.over() & ~waiting, self.colony.capacity)
-        terminated = (self.events.reshape(-1) == Event.DELIVERED) & (
-            self.task.delivery == "terminates"
-        )
-        return self.rewards.reshape(-1), terminated, truncated
-
-    def _renew(self, truncated: np.ndarray, mode: AutoresetMode, waiting: np.ndarray) -> None:
-        """Begin worlds after a step, as the mode says."""
-        begins = truncated.reshape(self.acted.shape)[:, 0]
+        over = self.over() & ~waiting
+        terminated = self.events == Event.DELIVERED
+        if self.task.delivery != "terminates":
+            terminated = np.zeros_like(terminated)
+        if mode is AutoresetMode.SAME_STEP and (over.any() or terminated.any()):
+            self._last = self.facts()
+        self._results = self.events.astype(np.uint8).reshape(-1), self.states().copy()
+        begins = over
         if mode is not AutoresetMode.SAME_STEP:
             begins = waiting & (mode is AutoresetMode.NEXT_STEP)
         if begins.any():
-            self.begin(begins)
+            self.begin(begins, [None] * len(begins))
+        truncated = np.repeat(over, self.colony.capacity)
+        return self.rewards.reshape(-1), terminated.reshape(-1), truncated
 
     def play(
         self,
@@ -149,14 +135,10 @@ class ColonyWorlds(Ants):
         for t, actions in enumerate(into.actions):
             if choices is not None and masks is not None:
                 actions[:] = choices.draw(masks.take(self.states()))
-            results = into.rewards[t], into.terminated[t], into.truncated[t]
-            for row, result in zip(results, self._take(actions, waiting), strict=True):
-                row[:] = result
-            into.events[t] = self.events.reshape(-1)
-            if mode is AutoresetMode.SAME_STEP:
-                finals[t] = self.states()
-            self._renew(into.truncated[t], mode, waiting)
-            ended = into.truncated[t].reshape(self.acted.shape)[:, 0]
+            rewards, terminated, truncated = self.advance(actions, mode, waiting)
+            into.rewards[t], into.terminated[t], into.truncated[t] = rewards, terminated, truncated
+            into.events[t], finals[t] = self._results
+            ended = truncated.reshape(self.acted.shape)[:, 0]
             waiting = ended | (waiting & (mode is AutoresetMode.DISABLED))
             into.observations[t + 1] = self.shown.show(self.states())
 

@@ -75,7 +75,6 @@ class LoneAnts(Ants):
         )
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
-        """Begin an episode of the ants `which`, bool (n,), with their seeds if they have one."""
         seed_of = {i: seed for i, seed in enumerate(seeds) if which[i] and seed is not None}
         if seed_of:
             self.batched.seed(list(seed_of.values()), np.array(list(seed_of)))

@@ -9,8 +9,7 @@ import numpy as np
 from gymnasium.error import InvalidAction
 
 from taichi_ants.errors import as_array, checked_whole, shown
-from taichi_ants.grid.constants import STREAM_ROLLOUT
-from taichi_ants.grid.randomness import GAMMA, mix, stream_state
+from taichi_ants.grid.randomness import GAMMA, mix
 from taichi_ants.learners.policies import checked_table, frozen_policy
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
@@ -77,11 +76,6 @@ class TablePolicy(NamedTuple):
     q_values: np.ndarray
     streams: np.ndarray
     epsilon: float
-
-    @classmethod
-    def of(cls, q_values: np.ndarray, n: int, epsilon: float, seed: int) -> TablePolicy:
-        """Return the choices of n ants with random streams of a seed."""
-        return cls(q_values, stream_state(seed, STREAM_ROLLOUT, np.arange(n)), epsilon)
 
     def masks(self) -> np.ndarray:
         """Return the actions with the largest value in each state, as bits: int64 (n_states,)."""

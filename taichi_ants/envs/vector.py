@@ -6,11 +6,9 @@ import operator
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Discrete
 from gymnasium.utils import seeding
@@ -29,13 +27,12 @@ from taichi_ants.errors import (
     shown,
     whole,
 )
+from taichi_ants.grid.constants import STREAM_ROLLOUT
+from taichi_ants.grid.randomness import stream_state
 from taichi_ants.task import Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, N_STATES, PICK_UP
 from taichi_ants.task.states import state_from_index
 from taichi_ants.worlds import World, build, from_text
-
-if TYPE_CHECKING:
-    from taichi_ants.rendering import Scene
 
 Place = str | os.PathLike[str] | World
 Worlds = Place | Sequence[Place]
@@ -92,11 +89,15 @@ class Ants(ABC):
             limit = checked_whole("max_episode_steps", arguments.max_episode_steps)
             self.max_steps = min(self.max_steps, limit)
         self.shown = Shown(task.sees, arguments.observation_format)
-        self._scene: Scene | None = None
+        self._scene: Any = None  # of `draw`
 
     @abstractmethod
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
-        """Begin an episode in the worlds `which`, bool (W,), with their seeds if they have one."""
+        """Begin an episode in the worlds `which`, bool (W,).
+
+        `seeds` has an entry for each of the W worlds. A world with a seed is reset completely; None
+        continues its random numbers.
+        """
 
     @abstractmethod
     def advance(
@@ -176,27 +177,14 @@ def task_of(task: Rules | None) -> Task:
 
 
 class OfAnts:
-    """Base of environments, which know whether they were reset, and whose `spec` has a step limit.
-
-    Gymnasium sets `max_episode_steps` only if it wraps an environment in a `TimeLimit`.
-    """
+    """Base of environments, which know whether they were reset."""
 
     _ants: Ants
     _begun = False
-    _spec: EnvSpec | None = None
 
     def _check_begun(self, what: str) -> None:
         if not self._begun:
             raise ResetNeeded(f"no episode has begun; call reset() before {what}.")
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """The specification if Gymnasium created the environment, else None."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = spec and replace(spec, max_episode_steps=self.max_steps)
 
     @property
     def max_steps(self) -> int:
@@ -357,11 +345,6 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         waiting, ants, n = self._waiting("rollout"), self._ants, self.num_envs
         length, actions, q_values = checked_plan(policy, steps, n, ants.task)
         epsilon, choices = checked_share("epsilon", epsilon), None
-        if q_values is None and (epsilon or seed is not None):
-            raise AntsError(
-                f"epsilon is {epsilon} and seed is {seed}, but the actions are given; leave both "
-                "out."
-            )
         into = Rollout.empty(length, n, ants.shown)
         if out is not None:
             expect("out", out, Rollout)
@@ -371,7 +354,8 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
             into = into._replace(actions=actions)
         if q_values is not None:
             drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
-            choices = TablePolicy.of(q_values, n, epsilon, drawn)
+            streams = stream_state(drawn, STREAM_ROLLOUT, np.arange(n))
+            choices = TablePolicy(q_values, streams, epsilon)
         finals = np.empty((length, n), np.int32)
         into.observations[0] = ants.shown.show(ants.states())
         ants.play(into, finals, self.autoreset_mode, waiting, choices)

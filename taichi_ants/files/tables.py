@@ -24,9 +24,10 @@ def table_of(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 def column(values: Sequence[Any]) -> np.ndarray:
     """Return a column of numbers or flags as an array of their type, others as Python objects."""
-    if {*map(type, values)} in (set(), {float}, {int}, {bool}):
+    kinds = {*map(type, values)}
+    if not kinds - {float} or kinds in ({int}, {bool}):
         numbers = np.array(values)
-        if numbers.dtype.kind != "O":  # that of whole numbers beyond 64 bits
+        if kinds != {int} or numbers.dtype.kind in "iu":  # not of whole numbers beyond 63 bits
             return numbers
     objects = np.empty(len(values), object)
     objects[:] = values

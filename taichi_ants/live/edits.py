@@ -17,7 +17,6 @@ from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.interventions import Intervention
-from taichi_ants.task import Pheromone
 
 Edit = dict[str, Any]
 
@@ -48,17 +47,20 @@ def values(interventions: Interventions) -> dict[str, Value]:
         values["epsilon"] = Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon")
     if colony.sharing != "frozen":
         values["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001, "learning_rate")
-    if pheromone.deposit != "none":
-        values["deposit"] = Value(
-            int(pheromone.level), 1, max(1000, int(pheromone.level)), 1, _path("level")
-        )
-    for name, largest in (("slope", 100), ("cap", 10_000)):
-        if (number := getattr(pheromone, name)) is not None:
-            values[name] = Value(int(number), 1, max(largest, int(number)), 1, _path(name))
-    falls = pheromone.evaporation != "none"
-    if _with_evaporation(interventions, not falls)[0].dense == pheromone.dense:
-        edits = {str(n): _switch(interventions, n == 1) for n in (0, 1)}
-        values["evaporation"] = Value(int(falls), 0, 1, 1, "task", edits)
+    numbers = (("deposit", "level", 1000), ("slope", "slope", 100), ("cap", "cap", 10_000))
+    for name, setting, largest in numbers:
+        number = getattr(pheromone, setting)
+        if number is not None and not (setting == "level" and pheromone.deposit == "none"):
+            values[name] = Value(int(number), 1, max(largest, int(number)), 1, _path(setting))
+    falls, evaporating = pheromone.evaporation != "none", colony.task.pheromone
+    if evaporating.evaporation == "none":
+        evaporating = replace(evaporating, evaporation="linear")
+    if (evaporating.lasting if falls else evaporating).dense == pheromone.dense:
+        flag = "evaporation_in_training" if colony.learns else "evaporation_in_evaluation"
+        switches: dict[str, Edit] = {str(n): {"task": {flag: bool(n)}} for n in (0, 1)}
+        if colony.task.pheromone.evaporation == "none":
+            switches["1"]["task"]["pheromone.evaporation"] = "linear"
+        values["evaporation"] = Value(int(falls), 0, 1, 1, "task", switches)
     if pheromone.half_life is not None:
         half_life = float(pheromone.half_life)
         values["half_life"] = Value(
@@ -74,22 +76,6 @@ def values(interventions: Interventions) -> dict[str, Value]:
 
 def _path(name: str) -> str:
     return f"task.pheromone.{name}"
-
-
-def _switch(interventions: Interventions, falls: bool) -> Edit:
-    """Return the edit that switches evaporation on (1 per tick if the task has none) or off."""
-    learns = interventions.colony.learns
-    flag = "evaporation_in_training" if learns else "evaporation_in_evaluation"
-    none = falls and interventions.colony.task.pheromone.evaporation == "none"
-    return {"task": {flag: falls, **({"pheromone.evaporation": "linear"} if none else {})}}
-
-
-def _with_evaporation(interventions: Interventions, falls: bool) -> tuple[Pheromone, Pheromone]:
-    """Return pheromones with or without evaporation: that of the colony, and that of its task."""
-    pheromone = interventions.colony.task.pheromone
-    if falls and pheromone.evaporation == "none":
-        pheromone = replace(pheromone, evaporation="linear")
-    return (pheromone if falls else pheromone.lasting), pheromone
 
 
 def checked(edit: object, interventions: Interventions) -> Intervention:
@@ -109,6 +95,6 @@ def checked(edit: object, interventions: Interventions) -> Intervention:
     if isinstance(cells, str):
         flat = colony.worlds[0].region(cells).tolist()
     else:
-        flat = [language.flat_index(colony.grid, cell) for cell in cells]
+        flat = language.flat_indices(colony.grid, cells)
     # `Clear` stands for any intervention with cells.
     return replace(cast(language.Clear, intervention), cells=flat)

@@ -10,53 +10,52 @@ import multiprocessing
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from multiprocessing.connection import Connection
 from typing import Any
+
+import numpy as np
 
 from taichi_ants.errors import AntsError
 from taichi_ants.live.session import Log, Session, bytes_of
 from taichi_ants.viewer import Recording, page
 
-Progress = Callable[[int], None]  # called with the number of ticks that have passed
+Snapshots = Iterable[tuple[Session, bytes]]  # of a replay, see `Session.snapshots`
 
 _PROGRESS_EVERY = 0.1  # seconds
 _SLICE = 0.05  # seconds of a replay per turn of the server
+LOAD = "load"  # pages' name for a replay: of an uploaded file, or to undo a change
 
 
-def recording(log: Log, most_frames: int = 1000, progress: Progress | None = None) -> Recording:
-    """Return a recording of the session; `most_frames` is as in `Session.snapshots`."""
-    (*_, session), frames = zip(*_snapshots(log, most_frames, progress), strict=True)
+def recording(snapshots: Snapshots) -> Recording:
+    """Return a recording of a session."""
+    (*_, session), frames = zip(*snapshots, strict=True)
     return Recording(session.header(), list(frames))
 
 
-def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300) -> bytes:
-    """Return a GIF of the session; `most_frames` is as in `Session.snapshots`."""
-    from taichi_ants.rendering import colony_snapshots, frames, save_animation
+def gif_bytes(snapshots: Snapshots) -> bytes:
+    """Return a GIF of a session."""
+    from taichi_ants.rendering import Scene, colony_snapshots, save_animation
 
-    passed = _snapshots(log, most_frames, progress)
-    snapshots = (now for session, _ in passed for now in colony_snapshots(session.colony))
-    pictures = frames(snapshots, task=log.setup.task)
-    return bytes_of("session.gif", lambda path: save_animation(path, pictures, fps=12.0))
+    def pictures() -> Iterator[np.ndarray]:
+        scene = None
+        for session, _ in snapshots:
+            scene = scene or Scene(session.colony.grid, task=session.setup.task)
+            yield scene.draw(*next(colony_snapshots(session.colony)))
 
-
-def _snapshots(log: Log, most: int, progress: Progress | None) -> Iterator[tuple[Session, bytes]]:
-    for session, frame in Session.snapshots(log, most):
-        yield session, frame
-        if progress is not None:
-            progress(session.ticks)
+    return bytes_of("session.gif", lambda path: save_animation(path, pictures(), fps=12.0))
 
 
-LOAD = "load"  # pages' name for a replay: of an uploaded file, or to undo a change
-# Pages' names of files, file names, and the functions that make them: at once, or by an `Export`.
+# Pages' names of files, file names, and the functions that make them.
 QUICK: dict[str, tuple[str, Callable[[Session], bytes]]] = {
     "session": ("session.npz", Session.to_bytes),
     "policy": ("policy.npz", Session.policy_bytes),
     "colony": ("colony.npz", Session.colony_bytes),
 }
-SLOW: dict[str, tuple[str, Callable[[Log, Progress], bytes]]] = {
-    "page": ("session.html", lambda log, told: page(recording(log, progress=told)).encode()),
-    "gif": ("session.gif", gif_bytes),
+# The same for an `Export`, with the number of snapshots.
+SLOW: dict[str, tuple[str, Callable[[Snapshots], bytes], int]] = {
+    "page": ("session.html", lambda snapshots: page(recording(snapshots)).encode(), 1000),
+    "gif": ("session.gif", gif_bytes, 300),
 }
 
 
@@ -133,17 +132,19 @@ def _make(
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
     if hasattr(os, "nice"):  # Windows does not have it
         os.nice(5)  # the server has priority
-    told = 0.0
+    _, make, most = SLOW[kind]
 
-    def progress(ticks: int) -> None:
-        nonlocal told
-        if time.monotonic() - told > _PROGRESS_EVERY:
-            told = time.monotonic()
-            answers.send(ticks)
+    def passed() -> Snapshots:
+        told = 0.0
+        for session, frame in Session.snapshots(Log.read("the session", content), most):
+            yield session, frame
+            if time.monotonic() - told > _PROGRESS_EVERY:
+                told = time.monotonic()
+                answers.send(session.ticks)
 
     try:
         if prepare is not None:
             prepare()
-        answers.send(SLOW[kind][1](Log.read("the session", content), progress))
+        answers.send(make(passed()))
     except AntsError as error:
         answers.send(str(error))

@@ -4,9 +4,9 @@ The server is reachable only from this machine. It serves the live page and a We
 open page; a socket requires the server's own page and its token. Pages send requests as JSON, see
 `SessionServer._do`; the server sends JSON messages and frames, see `taichi_ants.viewer.frames`.
 
-One thread serves the sockets. Another one, which calls `SessionServer.run`, owns the session.
-Requests pass through a queue to it, and messages for pages return to the socket thread. What takes
-long is a job, see `taichi_ants.live.exports`.
+The thread that calls `SessionServer.run` serves the sockets. Another one, `_engine`, performs the
+requests of pages and runs the session, one call at a time. What takes long is a job, see
+`taichi_ants.live.exports`.
 """
 
 from __future__ import annotations
@@ -17,13 +17,12 @@ import hmac
 import json
 import logging
 import math
-import queue
 import secrets
 import socket
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, InvalidStateError
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
 from importlib import resources
 from typing import TYPE_CHECKING, Any
@@ -50,13 +49,11 @@ _MOST_PAGES = 24
 _MOST_TEXT = 2**18  # bytes of a request
 _MOST_UPLOAD = 2**22  # bytes of a session file
 _MOST_IN_FLIGHT = 12  # frames sent to a page before it has drawn the first of them
-_MOST_WAITING = 2**27  # bytes buffered for a page that does not read
 _FEW = 4  # with fewer frames per episode, each frame shows another episode
 _PHASES = 24  # number of such frames that together show the course of an episode
 _STATE_EVERY = 0.5  # seconds
 _PROGRESS_EVERY = 0.2  # seconds
-_PAUSE = 0.004  # seconds of waiting after each frame, so that the socket thread can run
-_LONGEST_WAIT = 0.2  # seconds to wait for a request before the next check for the end
+_PAUSE = 0.004  # seconds in which the socket thread sends a message
 _QUIET = logging.getLogger("taichi_ants.live")  # keeps foreign requests out of the terminal
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
@@ -99,14 +96,11 @@ class Page:
         self.behind = False  # if True, the next frame must be a complete one
 
     def send(self, *messages: str | bytes) -> None:
-        """Send messages without waiting; disconnect pages that never read."""
+        """Send messages without waiting; pings disconnect pages that never read."""
         from websockets.asyncio.server import broadcast
 
         for message in messages:
             broadcast([self.connection], message)
-        transport = self.connection.transport
-        if transport.get_write_buffer_size() > _MOST_WAITING:
-            transport.abort()
 
     def show(self, frame: bytes) -> None:
         """Send a frame of changes, unless too many frames are unseen: then the page is behind."""
@@ -157,10 +151,9 @@ class SessionServer:
         self._shown = secrets.token_hex(8)  # identifies the session for pages that reconnect
         self._pages: set[Page] = set()
         self._joined = 0  # sockets, including those that have not received a session yet
-        # The page, its request as a function, and a future for the end of the request.
-        self._requests: queue.Queue[tuple[Page, Callable[[], object], Future[None]]] = queue.Queue()
-        self._loop = asyncio.new_event_loop()
-        self._over, self._leave = threading.Event(), asyncio.Event()
+        self._engine = ThreadPoolExecutor(1, "session")
+        self._loop: asyncio.AbstractEventLoop
+        self._over = threading.Event()
         self._ticks_due, self._frame_steps, self._due = 0.0, 1.0, 0.0  # see _advance_frame
         self._prepare = prepare
         self._previous: Session | None = None  # the session before the present one
@@ -184,8 +177,6 @@ class SessionServer:
         """Make `run` return soon; can be called from any thread."""
         self._over.set()
 
-    # Methods for the thread that calls `run`: simulation and requests.
-
     def run(
         self, seconds: float | None = None, each_turn: Callable[[], object] = lambda: None
     ) -> None:
@@ -193,20 +184,32 @@ class SessionServer:
 
         Calls `each_turn` several times per second; its exceptions end the server and propagate.
         """
-        sockets = threading.Thread(target=self._serve, name="sockets", daemon=True)
-        sockets.start()
-        end = math.inf if seconds is None else time.monotonic() + seconds
+        asyncio.run(self._run(math.inf if seconds is None else seconds, each_turn))
+
+    async def _run(self, seconds: float, each_turn: Callable[[], object]) -> None:
+        from websockets.asyncio.server import serve
+
+        settings: dict[str, Any] = {
+            **{"max_size": _MOST_UPLOAD, "max_queue": 4, "compression": None},
+            **{"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3},
+            **{"process_request": self._open, "logger": _QUIET},
+        }
+        self._loop, end = asyncio.get_running_loop(), time.monotonic() + seconds
         try:
-            while not self._over.is_set() and time.monotonic() < end:
-                each_turn()
-                self._turn()
+            async with serve(self._handle_messages, sock=self._socket, **settings):
+                while not self._over.is_set() and time.monotonic() < end:
+                    each_turn()
+                    await self._loop.run_in_executor(self._engine, self._turn)
+                    wait = self._due - time.monotonic() if self._runs else 1.0
+                    await asyncio.sleep(0 if LOAD in self._jobs else min(wait, 1 / FRAMES_A_SECOND))
+                for page in self._pages:
+                    page.send(_message("over"))
         finally:
-            self._over.set()
             for job in self._jobs.values():
                 job.cancel()
-            with contextlib.suppress(RuntimeError):  # the loop has already ended
-                self._loop.call_soon_threadsafe(self._leave.set)
-            sockets.join(2)
+            self._engine.shutdown()
+
+    # Methods for the engine's thread: simulation and requests.
 
     @property
     def _runs(self) -> bool:
@@ -214,7 +217,7 @@ class SessionServer:
         return self.playing and LOAD not in self._jobs
 
     def _turn(self) -> None:
-        """Advance by a frame if one is due, and handle requests."""
+        """Advance by a frame if one is due, continue jobs, and send the state from time to time."""
         runs = self._runs and bool(self._pages)  # pause if no page is open
         now = time.monotonic()
         if now >= self._next_state:
@@ -227,13 +230,6 @@ class SessionServer:
                 self._finish_job(kind, job)
         if runs and time.monotonic() >= self._due:
             self._advance_frame()
-        now = time.monotonic()
-        due = now if LOAD in self._jobs else self._due if runs else math.inf
-        wait = min(due - now, self._next_state - now, _LONGEST_WAIT)
-        with contextlib.suppress(queue.Empty):
-            for _ in range(1 + len(self._pages)):  # about one request per page
-                self._answer(*self._requests.get(timeout=max(wait, _PAUSE)))
-                wait = 0.0
 
     def _finish_job(self, kind: str, job: Replay | Export) -> None:
         """Begin the finished session, send the finished file to its page, or send an error."""
@@ -290,19 +286,14 @@ class SessionServer:
             if self._compiles:
                 self._compiles, self._next_state = False, 0.0  # send the new state at once
 
-    def _answer(self, page: Page, act: Callable[[], object], answered: Future[None]) -> None:
+    def _answer(self, page: Page, act: Callable[[], object]) -> None:
         """Perform a request or send its page an error; then send the state to all pages soon."""
-        refused = None
         try:
             act()
-        except Closed as error:
-            refused = error
         except (AntsError, MemoryError) as error:
             no_memory = isinstance(error, MemoryError)
             words = "this needs more memory than is available." if no_memory else str(error)
             self._send(_message("error", words=words), to=page)
-        with contextlib.suppress(InvalidStateError):  # the page has disconnected
-            answered.set_exception(refused) if refused else answered.set_result(None)
         self._next_state = min(self._next_state, time.monotonic() + 1 / FRAMES_A_SECOND)
 
     def _do(self, page: Page, request: Any) -> None:
@@ -436,27 +427,6 @@ class SessionServer:
 
     # Methods for the socket thread.
 
-    def _serve(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        try:
-            self._loop.run_until_complete(self._listen())
-        finally:
-            self._over.set()  # without sockets, `run` has to end too
-            self._loop.close()
-
-    async def _listen(self) -> None:
-        from websockets.asyncio.server import serve
-
-        settings: dict[str, Any] = {
-            **{"max_size": _MOST_UPLOAD, "max_queue": 4, "compression": None},
-            **{"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3},
-            **{"process_request": self._open, "logger": _QUIET},
-        }
-        async with serve(self._handle_messages, sock=self._socket, **settings):
-            await self._leave.wait()
-            for page in self._pages:
-                page.send(_message("over"))
-
     def _open(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the page or an error; None opens a socket.
 
@@ -513,13 +483,11 @@ class SessionServer:
         finally:
             self._joined -= 1
             self._pages.discard(page)
-            self._requests.put((page, partial(self._forget, page), Future()))
+            await self._request(page, partial(self._forget, page))
 
     async def _request(self, page: Page, act: Callable[[], object]) -> None:
-        """Wait until the thread of the session has performed a request of a page."""
-        answered: Future[None] = Future()
-        self._requests.put((page, act, answered))
-        await asyncio.wrap_future(answered)
+        """Wait until the engine's thread has performed a request of a page."""
+        await self._loop.run_in_executor(self._engine, self._answer, page, act)
 
 
 def _message(kind: str, /, **facts: Any) -> str:

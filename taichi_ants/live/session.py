@@ -81,12 +81,11 @@ class Log:
             changes = [checked_whole("changes", first, 0, last) for first in facts["changes"]]
             if changes[:1] != [0][: len(edits)] or changes != sorted(set(changes)):
                 raise ValueError("changes")
-            log = cls(
+            return cls(
                 *(Setup.from_json(facts["setup"], arrays["table"]), tuple(edits), steps),
                 checked_whole("ticks", facts["ticks"], 0, steps),
                 *(facts["state"], str(path), tuple(changes)),
             )
-        return log
 
 
 class _Snapshot(NamedTuple):
@@ -119,7 +118,7 @@ class Session:
         self._begun = 0  # episodes that began after one had ended
         self._snapshots: list[_Snapshot] = []
         self._spent = 0.0  # seconds of simulation so far
-        self.interventions.length = self._length
+        self.interventions.length = setup.ticks_per_episode or None
         self.interventions.begin_episode()
         self.colony.observe([])  # has no effect, but compiles kernels for the first edit
         # The title must not contain the number of ants, because interventions change it.
@@ -128,10 +127,6 @@ class Session:
         self._recorder.progress.note()
         self._recorder.snapshot()
         self._named = set(self._recorder.names())
-
-    @property
-    def _length(self) -> int | None:
-        return self.setup.ticks_per_episode or None
 
     @property
     def ticks(self) -> int:
@@ -146,7 +141,7 @@ class Session:
     @property
     def ended(self) -> bool:
         """Whether the episode has ended; the next step begins another one."""
-        return self.colony.ticks == self._length
+        return self.colony.ticks == self.interventions.length
 
     def header(self) -> dict[str, Any]:
         """Return facts about all frames, see `Recorder.header`."""
@@ -189,7 +184,8 @@ class Session:
             self._begun += 1  # first, because Ctrl-C during a launch raises an error after it
             self.interventions.begin_episode()
             return None
-        n = min(n, self._length - self.colony.ticks if self._length else n)
+        length = self.interventions.length
+        n = min(n, length - self.colony.ticks) if length else n
         check_most("ticks", self.ticks + n)
         began = time.perf_counter()
         try:
@@ -332,7 +328,7 @@ class Session:
         return session._follow(self.edits[len(session.edits) : last], steps, changes), steps
 
     @classmethod
-    def snapshots(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
+    def snapshots(cls, log: Log, most: int) -> Iterator[tuple[Session, bytes]]:
         """Yield about `most` snapshots of a replay: the session, and a frame of changes.
 
         If there are fewer steps and edits, each step and each edit has a snapshot.

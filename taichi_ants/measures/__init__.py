@@ -4,10 +4,9 @@
 your own. docs/measures.md lists the built-in ones.
 """
 
-from taichi_ants.measures.built_in import BUILT_IN
+from taichi_ants.measures.built_in import BUILT_IN, shortest_path
 from taichi_ants.measures.finished import Run
 from taichi_ants.measures.measure import Measure
-from taichi_ants.measures.paths import shortest_path
 from taichi_ants.measures.registry import check_part, get, names, register
 from taichi_ants.measures.series import Series
 

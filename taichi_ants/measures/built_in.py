@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from taichi_ants.errors import AntsError
 from taichi_ants.measures.measure import COUNTS, Measure
-from taichi_ants.measures.paths import shortest_path
-from taichi_ants.task.constants import OBSTACLE
+from taichi_ants.task.constants import FOOD, OBSTACLE, QUEEN
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
 
@@ -70,6 +70,26 @@ def path_length(counts: Counts) -> Any:
     An ant that walks straight to the queen from a pick-up k moves away from her needs k + 1 ticks.
     """
     return ratio(counts["carried"], counts["deliveries"])
+
+
+@lru_cache(maxsize=256)
+def shortest_path(world: World) -> float:
+    """Return the fewest ticks from pick-up to delivery for the nearest food item of a world.
+
+    It is d - 1, at least 1, where d is the number of steps from the food to the queen around
+    obstacles, through cells that are empty or hold food. An ant picks up food from a neighbour
+    cell and delivers it to a neighbour cell. Turns and other ants can make the path longer. The
+    value is nan if the queen has no path to food.
+    """
+    ground, offsets = world.ground(), world.grid.offsets.astype(np.int64)
+    seen, steps = ground == OBSTACLE, 0
+    reached = np.flatnonzero(ground == QUEEN)
+    while len(reached) and not (ground[reached] == FOOD).any():
+        seen[reached] = True
+        reached = np.unique(reached[:, None] + offsets)
+        reached = reached[~seen[reached]]
+        steps += 1
+    return max(1.0, float(steps - 1)) if len(reached) else math.nan
 
 
 def _path_ratio(snapshot: Snapshot) -> float:

@@ -83,13 +83,7 @@ def of_episodes(measure: Measure, counts: Counts) -> np.ndarray:
     Raises:
         AntsError: The measure reads a count that lone ants do not have, or does not work on arrays.
     """
-    try:
-        return np.broadcast_to(measure.function(counts), np.shape(counts["ticks"]))
-    except Exception as error:
-        raise AntsError(
-            f"the measure {measure.name!r} failed with {type(error).__name__}: {error}; a measure "
-            f"of lone ants must compute with arrays of the counts {', '.join(counts)}."
-        ) from error
+    return np.broadcast_to(measure.computed(counts), np.shape(counts["ticks"]))
 
 
 def of_lone_ants(counts: Counts) -> dict[str, np.ndarray]:

@@ -6,12 +6,11 @@ your own measure, call `register` in a notebook or a plugin file.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError
 from taichi_ants.measures.built_in import BUILT_IN
 from taichi_ants.measures.measure import COUNTS, RUN, Measure
 from taichi_ants.registry import Registry
@@ -45,20 +44,12 @@ def register(
             a function of its series, which returns a number; "run" for a function of finished runs.
 
     Raises:
-        AntsError: The name is not a word or belongs to a built-in measure, `function` does not take
-            these arguments, or `of` is not a measure of one state.
+        AntsError: The name is not a word or belongs to a built-in measure, or `of` is not a measure
+            of one state.
     """
     MEASURES.check_new(name)
-    arguments = {None: ["snapshot"], COUNTS: [COUNTS], RUN: [RUN]}.get(of, ["values", "snapshot"])
     if of not in (None, COUNTS, RUN):
         get(of).check_single_state("of")
-    try:
-        inspect.signature(function).bind(*arguments)
-    except (TypeError, ValueError) as error:
-        raise AntsError(
-            f"the function of the measure {name!r} is {shown(function)}; it must be a function of "
-            f"({', '.join(arguments)})."
-        ) from error
     return MEASURES.add(name, Measure(name, function, unit, summary, of))
 
 

@@ -108,11 +108,6 @@ class Recorder:
             column = [row.get(name, math.nan) for row in self._values]
             if not any(isinstance(value, np.ndarray) for value in column):
                 values[name] = np.array(column, float)
-            elif len({np.shape(value) for value in column}) > 1:  # type: ignore[arg-type]
-                raise AntsError(
-                    f"the measure {name!r} returned arrays of different shapes; return the same "
-                    "shape for all worlds and ticks."
-                )
             else:
                 maps[name] = np.stack(column)  # type: ignore[arg-type]
         worlds, episodes, ticks = np.array(self._rows, np.int32).reshape(-1, 3).T.copy()

@@ -76,14 +76,6 @@ class Tidy:
         files.write_csv(path, self.rows(), [*self.measured().index, "measure", "value"])
 
 
-def seed_array(seeds: Any) -> np.ndarray:
-    """Return seeds as int64, or as Python integers if one does not fit."""
-    try:
-        return np.array(seeds, np.int64)
-    except OverflowError:
-        return np.array(seeds, object)
-
-
 def parts_of(table: Measured, name: object) -> list[str]:
     """Return a measure as a list, or the names of its parts; AntsError if there is none."""
     if isinstance(name, str) and name in table.values:

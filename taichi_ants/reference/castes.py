@@ -25,39 +25,32 @@ def caste_of(task: Task, ant: Ant) -> Caste:
     return [*task.castes.values()][ant.caste] if task.castes else Caste()
 
 
-def shares_of(castes: Sequence[Caste], nest: int) -> list[float | None]:
-    """Return the share of each caste in a nest; None if `ants` gives its number, or it is absent.
+def parts_of(castes: Sequence[Caste], nest: int) -> list[tuple[int, float]]:
+    """Return the ants that `ants` gives to each caste of a nest, and its share of all others.
 
     Castes with neither divide the remaining share equally.
     """
-    of_nest = [caste for caste in castes if caste.nest is None or caste.nest == nest]
+    of_nest = [caste for caste in castes if caste.nest in (None, nest)]
     taken = sum([caste.share for caste in of_nest if caste.share is not None])
     neither = [caste for caste in of_nest if caste.share is None and caste.ants is None]
     rest = max(1.0 - taken, 0.0) / max(len(neither), 1)
+    shares = [rest if caste.share is None else caste.share for caste in castes]
     return [
-        None
-        if caste.nest not in (None, nest) or caste.ants is not None
-        else (rest if caste.share is None else caste.share)
-        for caste in castes
-    ]
-
-
-def fixed_numbers(castes: Sequence[Caste], nest: int) -> list[int]:
-    """Return the ants that `ants` gives to each caste of a nest."""
-    return [
-        caste.ants if caste.ants is not None and caste.nest in (None, nest) else 0
-        for caste in castes
+        (0, 0.0)
+        if caste.nest not in (None, nest)
+        else ((0, share) if caste.ants is None else (caste.ants, 0.0))
+        for caste, share in zip(castes, shares, strict=True)
     ]
 
 
 def castes_at_start(castes: Sequence[Caste], nest: int, n: int) -> list[int]:
     """Return the castes of the n ants of a nest, in the order of their numbers."""
-    numbers, shares = fixed_numbers(castes, nest), shares_of(castes, nest)
-    rest = n - sum(numbers)
+    parts = parts_of(castes, nest)
+    rest = n - sum(fixed for fixed, _ in parts)
+    quotas = [round(share * rest, 9) for _, share in parts]
     assert rest >= 0  # the castes fit
-    assert not rest or any(shares)
-    quotas = [round((share or 0.0) * rest, 9) for share in shares]
-    numbers = [fixed + int(quota) for fixed, quota in zip(numbers, quotas, strict=True)]
+    assert not rest or any(share for _, share in parts)
+    numbers = [fixed + int(quota) for (fixed, _), quota in zip(parts, quotas, strict=True)]
     while sum(numbers) < n:
         remainders = [quota - int(quota) for quota in quotas]
         largest = remainders.index(max(remainders))
@@ -71,11 +64,11 @@ def draw_caste(castes: Sequence[Caste], nest: int, n: int, stream: RandomStream)
     if len(castes) < 2:
         return 0
     high, _ = stream.draw()
-    fixed, shares = fixed_numbers(castes, nest), shares_of(castes, nest)
-    rest = (n - sum(fixed)) / n if n else 1.0
+    parts = parts_of(castes, nest)
+    rest = (n - sum(fixed for fixed, _ in parts)) / n if n else 1.0
     cumulative = 0.0
-    for caste in range(len(castes) - 1):
-        cumulative += fixed[caste] / max(n, 1) + (shares[caste] or 0.0) * rest
+    for caste, (fixed, share) in enumerate(parts[:-1]):
+        cumulative += fixed / max(n, 1) + share * rest
         if cumulative > high / _WORDS:
             return caste
     return len(castes) - 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -39,12 +39,10 @@ from taichi_ants.reference.choice import (
 )
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
-from taichi_ants.reference.learners import LEARNERS
+from taichi_ants.reference.learners import LEARNERS, learn_together
 from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, codes_in_view, observe
-from taichi_ants.reference.own_observations import state_by
-from taichi_ants.reference.own_rules import choose_by_rule, pay
+from taichi_ants.reference.own_rules import choose_by_rule, pay, state_by
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
-from taichi_ants.reference.sharing import learn_together
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task
 from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP
@@ -150,11 +148,6 @@ class ReferenceColony:
         """Whether ants learn."""
         return self.sharing != "frozen"
 
-    @property
-    def stimuli(self) -> list[float]:
-        """The stimulus of each nest, to which idle ants respond."""
-        return self.world.stimuli
-
     def table_of(self, ant: Ant | Transition) -> int:
         """Return the number of the table of an ant."""
         if self.sharing == "independent":
@@ -233,14 +226,6 @@ class ReferenceColony:
         self.learning_rate = max(least, self.learning_rate * training.learning_rate_decay)
         self.records.append(self.record)
 
-    def run_episode(self, ticks: int) -> Iterator[list[Transition]]:
-        """Yield the transitions of each tick of an episode of `ticks`, or less if it ends early."""
-        self.begin_episode()
-        while self.record.ticks < ticks and not self.over:
-            self.tick(last=self.record.ticks == ticks - 1)
-            yield self.transitions
-        self.end_episode()
-
     def tick(self, last: bool = False) -> None:
         """Advance the colony by one tick, after which the episode ends if `last`."""
         assert self.episode >= 0
@@ -252,7 +237,7 @@ class ReferenceColony:
         intents = []
         for ant in acting:
             if ant.idle:
-                stimulus = self.stimuli[ant.nest]
+                stimulus = self.world.stimuli[ant.nest]
                 ant.idle = not starts_foraging(ant, stimulus, self.task.labour)
             if ant.idle:
                 ant.action = -1
@@ -269,64 +254,38 @@ class ReferenceColony:
                 self.food_sources.taken(picked, tick)
         for trail in self.world.pheromones.values():
             trail.tick(tick)
-        self._count(acting)
-        self.record.carried += sum(
-            was.carried
-            for was, ant in zip(before, acting, strict=True)
-            if ant.event is Event.DELIVERED
-        )
-        for nest in range(len(self.stimuli)):
-            fed = sum(ant.event is Event.DELIVERED and ant.nest == nest for ant in acting)
-            relief = self.task.labour.relief or 0.0
-            self.stimuli[nest] = max(0.0, self.stimuli[nest] - relief * fed)
-        if self.task.life.births:
-            for ant in acting:
-                self.stores[ant.nest] += ant.event is Event.DELIVERED
-            for nest in range(len(self.stores)):
-                self._births(nest)
+        self._count(before, acting)
+        for nest in range(len(self.stores)):
+            self._births(nest)
         dying = self._deaths(acting)
         life = self.task.life
         delays = [food.regrowth for food in self.task.foods.values()] or [life.regrowth]
         self.record.regrown += self.food_sources.regrow(self.world, delays, tick)
         if life.pile_move_interval is not None and (tick + 1) % life.pile_move_interval == 0:
             self.food_sources.move_piles(self.world, self.queen_stream)
-        foraged = [not ant.idle for ant in acting]
-        stopping = set()
-        if self.task.labour.rule == "thresholds":
-            for ant in acting:
-                if not ant.idle and stops_foraging(ant, self.world.queens[ant.nest], self.task):
-                    stopping.add(ant.slot)
+        foragers = [pair for pair in zip(before, acting, strict=True) if not pair[1].idle]
+        stopping = {
+            ant.slot
+            for _, ant in foragers
+            if stops_foraging(ant, self.world.queens[ant.nest], self.task)
+        }
         for ant in [*self.ants.values(), *dying]:
             self.observe(ant)
-        pairs = [(was, ant) for was, ant, f in zip(before, acting, foraged, strict=True) if f]
-        self._pay(pairs, tick)
+        if self.task.own_reward is not None:
+            for was, ant in foragers:
+                paid = pay(self.world, was, ant, self.task.own_reward, self.task, tick)
+                self.record.episode_return += paid - ant.reward
+                ant.reward = paid
         self.over = self._ends_at_delivery and self.record.deliveries > 0
-        self._learn(
-            [was for was, _ in pairs], [ant for _, ant in pairs], stopping, last or self.over
-        )
-        for ant in acting:
+        self._learn(foragers, stopping, last or self.over)
+        for _, ant in foragers:
             if ant.slot in stopping:
                 ant.idle, ant.chosen = True, None
                 if self.sharing == "independent":
                     self.learners[ant.slot].begin()
-        if self.task.labour.rule == "thresholds":
-            self.stimuli[:] = [
-                stimulus + (self.task.labour.demand or 0.0) for stimulus in self.stimuli
-            ]
+        for nest in range(len(self.stores)):
+            self.world.stimuli[nest] += self.task.labour.demand or 0.0
         self.record.ticks += 1
-
-    def _pay(self, pairs: Sequence[tuple[Ant, Ant]], tick: int) -> None:
-        """Replace the rewards of a tick by those of your own rule, if there is one.
-
-        `pairs` has each ant before and after the tick.
-        """
-        rule = self.task.own_reward
-        if rule is None:
-            return
-        for was, ant in pairs:
-            paid = pay(self.world, was, ant, rule, self.task, tick)
-            self.record.episode_return += paid - ant.reward
-            ant.reward = paid
 
     def _draw_action(self, ant: Ant, tick: int) -> int:
         caste, choice = caste_of(self.task, ant), self.task.choice
@@ -341,22 +300,27 @@ class ReferenceColony:
             return choose_by_rule(self.world, ant, self.task, values, epsilon, tick)
         return choose_action(values, epsilon, ant.stream, choice)
 
-    def _count(self, acting: Sequence[Ant]) -> None:
-        """Record what happened in the tick."""
-        record, delivered = self.record, sum(ant.event is Event.DELIVERED for ant in acting)
+    def _count(self, before: Sequence[Ant], acting: Sequence[Ant]) -> None:
+        """Record what happened in the tick, and store and use what each nest got."""
+        record, task = self.record, self.task
         record.episode_return += sum(ant.reward for ant in acting)
-        record.moves += sum(0 <= ant.executed < PICK_UP for ant in acting)
-        record.blocked += sum(
-            0 <= ant.executed < PICK_UP and ant.event in (Event.BLOCKED, Event.PUSHED)
-            for ant in acting
-        )
-        record.deliveries += delivered
-        for ant in acting:
+        moving = [ant for ant in acting if 0 <= ant.executed < PICK_UP]
+        record.moves += len(moving)
+        record.blocked += sum(ant.event in (Event.BLOCKED, Event.PUSHED) for ant in moving)
+        fed = [0] * len(self.stores)
+        for was, ant in zip(before, acting, strict=True):
             if ant.event is Event.DELIVERED:
+                record.deliveries += 1
+                record.carried += was.carried
                 record.delivered[ant.nest, ant.kind] += 1
                 record.by_caste[ant.caste] += 1
+                fed[ant.nest] += 1
         if record.deliveries and record.first_delivery < 0:
             record.first_delivery = record.ticks + 1
+        for nest, n in enumerate(fed):
+            relief = (task.labour.relief or 0.0) * n
+            self.world.stimuli[nest] = max(0.0, self.world.stimuli[nest] - relief)
+            self.stores[nest] += n * task.life.births
 
     def _births(self, nest: int) -> None:
         """Turn stored food into ants that face away from their queen, while there is room."""
@@ -403,12 +367,13 @@ class ReferenceColony:
         self.record.deaths += len(dying)
         return dying
 
-    def _learn(
-        self, before: Sequence[Ant], after: Sequence[Ant], stopping: set[int], last: bool
-    ) -> None:
-        """Draw the next actions if the learner needs them, by the present tables; then learn."""
+    def _learn(self, pairs: Sequence[tuple[Ant, Ant]], stopping: set[int], last: bool) -> None:
+        """Draw the next actions if the learner needs them, by the present tables; then learn.
+
+        `pairs` has each forager before and after the tick.
+        """
         self.transitions = []
-        for was, ant in zip(before, after, strict=True):
+        for was, ant in pairs:
             terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
             # After a delivery that terminates, the ant chooses at the start of its next tick.
             draws_ahead = self.learners[self.table_of(ant)].draws_next_action
@@ -436,18 +401,17 @@ class ReferenceColony:
                     caste=ant.caste,
                 )
             )
-        members: dict[int, list[int]] = defaultdict(list)
-        for index, ant in enumerate(after):
+        members: dict[int, list[tuple[Ant, Transition]]] = defaultdict(list)
+        for (_, ant), step in zip(pairs, self.transitions, strict=True):
             if not self._is_frozen(ant):
-                members[self.table_of(ant)].append(index)
-        for number, indices in members.items():
-            learner, caste = self.learners[number], caste_of(self.task, after[indices[0]])
+                members[self.table_of(ant)].append((ant, step))
+        for number, of_table in members.items():
+            learner, caste = self.learners[number], caste_of(self.task, of_table[0][0])
             rate, discount = caste.learning_rate, caste.discount
             learner.learning_rate = np.float32(self.learning_rate if rate is None else rate)
             learner.discount = np.float32(self.training.discount if discount is None else discount)
             epsilon = self.epsilon if caste.epsilon is None else caste.epsilon
-            steps = [self.transitions[index] for index in indices]
-            streams = [after[index].stream for index in indices]
+            steps, streams = [step for _, step in of_table], [ant.stream for ant, _ in of_table]
             if self.sharing == "independent":
                 steps[0].td_error = learner.learn(steps[0], epsilon, streams[0])
             else:

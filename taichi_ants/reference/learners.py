@@ -5,17 +5,18 @@ All numbers are np.float32, with one rounding per operation; the order of operat
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 import numpy as np
 
+from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.reference.ants import Pair, Transition
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.task.constants import N_ACTIONS
 
-if TYPE_CHECKING:
-    from taichi_ants.learners.config import TrainingConfig
+_ONE = 1 << 32  # TD errors of ants that share a table are summed in units of 2**-32
 
 
 class ReferenceLearner:
@@ -26,7 +27,6 @@ class ReferenceLearner:
 
     Attributes:
         draws_next_action: Whether the next action is drawn before the update, as in SARSA.
-        shares: Whether all ants of a world can learn into one table: the update is `error` alone.
         hyperparameters: The settings that only this learner has, with their defaults.
         rows: The table, n_states lists of 5 np.float32, which are faster here than an array.
         model: For learners that plan, the last transition of each visited pair, in the order of
@@ -34,7 +34,6 @@ class ReferenceLearner:
     """
 
     draws_next_action = False
-    shares = True
     hyperparameters: ClassVar[Mapping[str, float]] = {}
 
     def __init__(
@@ -142,8 +141,6 @@ class DoubleQ(ReferenceLearner):
     Ants act by the mean of both tables.
     """
 
-    shares = False
-
     def begin_run(self) -> None:
         self._tables = [[list(row) for row in self.rows] for _ in "AB"]
 
@@ -166,7 +163,6 @@ class DoubleQ(ReferenceLearner):
 class SarsaLambda(Sarsa):
     """SARSA(lambda) with replacing traces (Singh and Sutton 1996) for the most recent pairs."""
 
-    shares = False
     hyperparameters: ClassVar = {"trace_decay": 0.9, "trace_length": 32}
 
     def begin(self) -> None:
@@ -190,7 +186,6 @@ class NStepSarsa(Sarsa):
     A pair is updated n steps later, or at the end of the episode.
     """
 
-    shares = False
     hyperparameters: ClassVar = {"n_steps": 4}
 
     def begin(self) -> None:
@@ -216,7 +211,6 @@ class PrioritizedSweeping(DynaQ):
     All updates use the model, also the update of the present step.
     """
 
-    shares = False
     hyperparameters: ClassVar = {"planning_steps": 5, "threshold": 0.0001}
 
     def begin_run(self) -> None:
@@ -258,3 +252,52 @@ LEARNERS: dict[str, type[ReferenceLearner]] = {
     "n_step_sarsa": NStepSarsa,
     "prioritized_sweeping": PrioritizedSweeping,
 }
+
+
+def learn_together(
+    learner: ReferenceLearner,
+    steps: Sequence[Transition],
+    streams: Sequence[RandomStream],
+    epsilon: float,
+    most: int,
+) -> None:
+    """Learn from all transitions of a tick, and set the `td_error` of each.
+
+    All TD errors of a tick, or of a round of planning, use the table from before it. The n errors
+    of a pair are rounded to multiples of 2**-32, so that their sum is exact. They move the value by
+    1 - (1 - alpha)**n of their mean, as n successive updates towards one target would. A single
+    error is not rounded. `streams` are those of the ants, from which learners draw; `most` is the
+    largest number of ants.
+    """
+    weights = update_weights(float(learner.learning_rate), most)
+    for step, error in zip(steps, _update(learner, steps, epsilon, weights), strict=True):
+        step.td_error = error
+    if isinstance(learner, DynaQ):
+        # If several ants have the same pair, the model keeps that of the highest number.
+        for step in sorted(steps, key=lambda step: (step.pair, step.number)):
+            learner.remember(step)
+        for _ in range(int(learner.settings["planning_steps"])):
+            _update(learner, [learner.draw_seen(stream) for stream in streams], epsilon, weights)
+
+
+def _update(
+    learner: ReferenceLearner, steps: Sequence[Transition], epsilon: float, weights: np.ndarray
+) -> list[np.float32]:
+    errors = [learner.error(step, epsilon) for step in steps]
+    errors_of: dict[Pair, list[np.float32]] = defaultdict(list)
+    for step, error in zip(steps, errors, strict=True):
+        errors_of[step.pair].append(error)
+    for pair, of_pair in errors_of.items():
+        mean = of_pair[0] if len(of_pair) == 1 else mean_error(of_pair)
+        learner.update(pair, weights[min(len(of_pair), len(weights) - 1)], mean)
+    return errors
+
+
+def mean_error(errors: Sequence[np.float32]) -> np.float32:
+    """Return the mean of TD errors, each rounded to a multiple of 2**-32, rounded once at the end.
+
+    The sum must fit into a signed 64-bit integer.
+    """
+    total = sum(int(np.floor(float(error) * _ONE + 0.5)) for error in errors)
+    assert -(1 << 63) <= total < 1 << 63
+    return np.float32(float(total) / (float(len(errors)) * _ONE))

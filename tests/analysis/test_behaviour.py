@@ -17,7 +17,6 @@ from taichi_ants.analysis.behaviour import (
     WALKS,
     classify,
 )
-from taichi_ants.engines.runs.training import trace_policies
 from taichi_ants.learners import policies
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT, SEES_CUE
 from taichi_ants.task.states import state_from_index
@@ -76,21 +75,6 @@ def test_constructed_policies(name):
     (found,), (earned,) = classify(trace, STEPS)
     assert BEHAVIOURS[found] == BEHAVIOURS[expected]
     assert earned == trace.rewards.sum()
-
-
-def test_traces_of_many_policies_are_single_rollouts():
-    tables = [table for table, _ in CASES.values()]
-    seeds = [3, 4, 3, -1, 2**64 - 2, 5, 6]
-    for task in (STILL, Task()):
-        (trace,) = trace_policies(paper(), tables, seeds, 90, task)
-        for number, (table, seed) in enumerate(zip(tables, seeds, strict=True)):
-            alone = rollout(paper(), table, seed, max_steps=90, task=task)
-            mine = trace.episodes == number
-            assert mine.sum() == len(alone)
-            for name in ("steps", "cells", "headings", "states", "actions", "rewards"):
-                np.testing.assert_array_equal(getattr(trace, name)[mine], getattr(alone, name))
-            np.testing.assert_array_equal(trace.q_values[mine], alone.q_values)
-            np.testing.assert_array_equal(trace.delivered[mine], alone.delivered)
 
 
 SEEN = "carrying E S E"

@@ -77,9 +77,7 @@ def verdict_of(effects: dict[str, list[float]], criterion: Criterion) -> tuple[V
 
 
 def finding_of(
-    effects: dict[str, list[float]],
-    criterion: Criterion,
-    possible: tuple[float, float] = UNBOUNDED,
+    effects: dict[str, list[float]], criterion: Criterion, possible: tuple[float, float] = UNBOUNDED
 ) -> Finding:
     uses_iqm = possible == UNBOUNDED
     return weakest(

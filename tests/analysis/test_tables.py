@@ -26,10 +26,10 @@ def test_numbers_as_text() -> None:
     assert (count(1, "seed"), count(0, "seed")) == ("1 seed", "0 seeds")
     assert (count(1, "delivery"), count(2, "delivery")) == ("1 delivery", "2 deliveries")
     assert [figure(x) for x in (0, 7, 7.2, 12.34, 123.4, math.inf)] == [
-        *("0", "7", "7.20", "12.3", "123", "-"),
+        *("0", "7", "7.20", "12.3", "123", "-")
     ]
     assert [percent(x) for x in (0, 0.0123, 0.5, 1.2, math.nan)] == [
-        *("0 %", "1.2 %", "50 %", "120 %", "-"),
+        *("0 %", "1.2 %", "50 %", "120 %", "-")
     ]
 
 
@@ -47,6 +47,6 @@ def test_a_table_is_the_same_in_markdown_and_in_a_terminal() -> None:
     assert lines[:3] == ["Insects.", "", "Bees"]
     assert lines[3].split() == ["How"]
     assert [line.split() for line in lines[4:8] if "\u2500" not in line] == [
-        *(["Who", "many"], ["a", "queen", "1"], ["[1,", "1]"]),
+        *(["Who", "many"], ["a", "queen", "1"], ["[1,", "1]"])
     ]
     assert lines[-2:] == ["Counted once.", "By hand."]

@@ -61,11 +61,7 @@ def compare_step(worlds: ColonyWorlds, world: int, plain: ReferenceColony, actio
         {},
         {"observation": "ants", "traffic": "right_of_way", "view": "strongest"},
         pytest.param(
-            {
-                "observation": "queues",
-                "traffic": "following",
-                "view": "strongest_under_carriers",
-            },
+            {"observation": "queues", "traffic": "following", "view": "strongest_under_carriers"},
             marks=pytest.mark.slow,
         ),
         {"noise": NOISE},

@@ -39,8 +39,7 @@ def guided(infos: dict, rng: np.random.Generator) -> dict[str, int]:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name != "paper")) for name in TASKS],
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "paper")) for name in TASKS]
 )
 def test_pettingzoo_finds_no_fault(name):
     """With births it can only note that not all agents that were possible have lived."""

@@ -270,7 +270,7 @@ def test_worlds_and_tasks_by_name_path_and_value(tmp_path) -> None:
     def played(**arguments: Any) -> str:
         env = gymnasium.make(ID, **arguments)
         env.reset(seed=3)
-        assert env.spec.max_episode_steps == 600
+        assert env.unwrapped.max_steps == 600
         return str([env.step(action) for action in MAZE])
 
     for same in ({"world": path}, {"world": str(path)}, {"task": "paper"}, {"task": task.paper()}):

@@ -221,7 +221,6 @@ def test_refuses(make, tmp_path):
         (AntsError, r"^policy is 'x'; it must be one of ", "x", {"steps": 3}),
         (AntsError, r"^q_values is nan", np.full((n_states, 5), np.nan), {"steps": 3}),
         (InvalidAction, rf"of shape \(3, {n}\)", np.zeros((2, n), int), {"steps": 3}),
-        (AntsError, r"^epsilon is 0.5 and seed is None", np.zeros((2, n), int), {"epsilon": 0.5}),
         (AntsError, r"^steps is None; it must", "random", {}),
         (AntsError, r"^steps is 0; ", "random", {"steps": 0}),
         (AntsError, r"^steps is 2.5; ", "random", {"steps": 2.5}),

@@ -8,14 +8,7 @@ import bridge_report
 import numpy as np
 import pytest
 from bridge import crossings, point, task
-from bridge_report import (
-    BRIDGES,
-    DESIGNS,
-    LATE,
-    WINDOWS,
-    Design,
-    late_shares,
-)
+from bridge_report import BRIDGES, DESIGNS, LATE, WINDOWS, Design, late_shares
 from PIL import Image
 
 from taichi_ants import AntsError, Colony, TrainingConfig

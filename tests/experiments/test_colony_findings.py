@@ -185,5 +185,5 @@ def test_the_table_of_differences_holds_what_verdicts_rest_on() -> None:
     assert (row["against"], row["verdict"]) == (8, "supported")
     growth = [row for row in rows if row["question"] == MORE]
     assert {(row["ants"], row["against"]) for row in growth} == {
-        *((2, 1), (4, 1), (8, 1), (4, 2), (8, 2), (8, 4)),
+        *((2, 1), (4, 1), (8, 1), (4, 2), (8, 2), (8, 4))
     }

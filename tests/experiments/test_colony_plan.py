@@ -4,16 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from colony import (
-    COMPARED,
-    LEARNING,
-    TASKS,
-    conditions_of,
-    greedy,
-    plan,
-    scheduled,
-    with_bounds,
-)
+from colony import COMPARED, LEARNING, TASKS, conditions_of, greedy, plan, scheduled, with_bounds
 from colony_findings import ELSEWHERES, WORLD_KINDS, Condition
 
 from taichi_ants import worlds

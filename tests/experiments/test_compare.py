@@ -22,14 +22,7 @@ from command_lines import (
 )
 from paper import process
 
-from taichi_ants import (
-    Task,
-    TrainingConfig,
-    evaluate,
-    load_policy,
-    train,
-    worlds,
-)
+from taichi_ants import Task, TrainingConfig, evaluate, load_policy, train, worlds
 from taichi_ants.files import archives
 from taichi_ants.measures.finished import Run, values_of
 
@@ -60,13 +53,8 @@ for measure in (
 COLUMNS += [
     f"runs_{name}" for name in ("delivers", "walks_the_trail", "circles_with_food", "other")
 ]
-FIGURES = {
-    *("figures/learning_curves.png", "figures/return_against_deliveries.png"),
-}
-LEARNERS = {
-    "sarsa": ("sarsa", ""),
-    "dyna_q_p2": ("dyna_q", "planning_steps=2"),
-}
+FIGURES = {*("figures/learning_curves.png", "figures/return_against_deliveries.png")}
+LEARNERS = {"sarsa": ("sarsa", ""), "dyna_q_p2": ("dyna_q", "planning_steps=2")}
 # Within 45 steps some deliver and some do not, in all of these.
 SHOWN = [
     f"{delivery}_{learner}_{behaviour}"

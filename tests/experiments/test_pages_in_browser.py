@@ -115,16 +115,6 @@ def test_claims_are_filtered(opened):
     assert tab.inner_text(".filters output") == "0 of 51 claims"
 
 
-def test_only_verdicts_that_occur_are_offered(opened):
-    tab = opened("colony")
-    offered = tab.locator(".filters [name=verdict] option").all_inner_texts()
-    assert offered[1:] == [one for one in VERDICTS if any(one in cells for cells in shown(tab))]
-    assert 1 < len(offered) < 1 + len(VERDICTS)
-    for one in offered[1:]:
-        tab.select_option(".filters [name=verdict]", one)
-        assert {cells[2] for cells in shown(tab)} == {one}
-
-
 def test_a_phone_sorts_by_a_choice_that_the_heads_share(opened):
     tab = opened("comparison", width=390)
     order = shown(tab)
@@ -142,10 +132,15 @@ def test_a_phone_sorts_by_a_choice_that_the_heads_share(opened):
     assert choice.input_value() == ""
 
 
-def test_all_details_open_at_once_and_stay_on_paper(opened):
+def test_details_open_one_by_one_or_at_once_and_stay_on_paper(opened):
     tab = opened("comparison")
     told, opener = tab.locator(".statements .told"), tab.locator(".filters [name=details]")
-    assert opener.inner_text() == "Open all details"
+    tab.locator(".statements summary").first.focus()
+    tab.keyboard.press("Enter")
+    assert "Tested on" in told.first.inner_text()
+    assert told.first.locator("svg.interval").first.bounding_box()["width"] > 200
+    tab.locator(".statements summary").first.click()
+    assert not told.first.is_visible()
     opener.click()
     tab.wait_for_function(
         """document.querySelector("[name=details]").innerText.startsWith("Close")"""
@@ -158,17 +153,11 @@ def test_all_details_open_at_once_and_stay_on_paper(opened):
     assert not any(one.is_visible() for one in told.all())
 
 
-def test_details_open_on_demand(opened):
+def test_one_player_at_a_time(opened):
     tab = opened("comparison")
-    told = tab.locator(".statements .told").first
-    assert not told.is_visible()
-    tab.locator(".statements summary").first.focus()
-    tab.keyboard.press("Enter")
-    assert told.is_visible()
-    assert "Tested on" in told.inner_text()
-    assert told.locator("svg.interval").first.bounding_box()["width"] > 200
-    tab.locator(".statements summary").first.click()
-    assert not told.is_visible()
+    for number in (0, 1):
+        tab.locator(".player button").nth(number).click()
+    assert tab.evaluate("report.players.map((one) => one.player.playing)") == [False, True]
 
 
 PIXELS = """number => [...document.querySelectorAll(".player")[number].querySelectorAll("canvas")]
@@ -204,56 +193,6 @@ def test_players_play(opened, name, last):
     assert tab.evaluate(PIXELS, 0) == end
 
 
-def test_one_player_at_a_time(opened):
-    tab = opened("comparison")
-    for number in (0, 1):
-        tab.locator(".player button").nth(number).click()
-    assert tab.evaluate("report.players.map((one) => one.player.playing)") == [False, True]
-
-
-@pytest.mark.parametrize("name", ["comparison", "colony"])
-def test_light_and_dark(opened, name):
-    tab = opened(name, color_scheme="dark")
-    ground = "getComputedStyle(document.body).backgroundColor"
-    dark, ants = tab.evaluate(ground), tab.evaluate(PIXELS, 0)
-    tab.click("#theme")
-    assert tab.evaluate(ground) == "rgb(255, 255, 255)" != dark
-    assert tab.evaluate(PIXELS, 0) != ants
-    tab.click("#theme")
-    assert tab.evaluate(ground) == dark
-    assert tab.evaluate(PIXELS, 0) == ants
-
-
-CONTENT = "all => all.map((one) => getComputedStyle(one, '::after').content)"
-SIZES = """() => Object.fromEntries(["td small", "td", "p", ".notes"].map((one) => {
-  const found = document.querySelector(`main ${one}`);
-  return [one, found ? parseFloat(getComputedStyle(found).fontSize) : 0];
-}))"""
-
-
-@pytest.mark.parametrize("name", ["comparison", "colony"])
-def test_paper_is_light_and_has_no_controls(opened, name):
-    tab = opened(name, color_scheme="dark")
-    controls = tab.locator("button:visible, input:visible, select:visible, nav:visible")
-    assert controls.count() > 5
-    tab.emulate_media(media="print")
-    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
-    assert tab.get_attribute("html", "data-theme") == "light"
-    assert controls.count() == 0
-    heads = tab.locator(".statements th").evaluate_all(CONTENT)
-    assert all(one.strip('"') for one in heads)
-    # What explains is not larger than what it explains.
-    sizes = tab.evaluate(SIZES)
-    assert sizes["td small"] < sizes["td"] <= sizes["p"]
-    assert sizes[".notes"] < sizes["p"]
-    assert tab.locator(".more table").first.is_visible()
-    assert tab.locator(".player canvas").first.is_visible()
-    tab.emulate_media(media="screen")
-    tab.evaluate("dispatchEvent(new Event('afterprint'))")
-    assert tab.get_attribute("html", "data-theme") == "dark"
-    assert not tab.locator(".more table").first.is_visible()
-
-
 @pytest.mark.parametrize("name", ["comparison", "colony"])
 def test_the_first_print_is_complete(opened, name, tmp_path):
     """All claims with their numbers, the method, the files, and the players with their worlds."""
@@ -272,27 +211,6 @@ def test_the_first_print_is_complete(opened, name, tmp_path):
     empty, queen = shares(sheets, *light)
     assert empty > 0.005
     assert queen > 1e-5
-
-
-FADES = "one => getComputedStyle(one).maskImage"
-
-
-def test_what_is_cut_on_a_phone_fades_there_and_the_papers_column_stays(opened):
-    tab = opened("comparison", width=390)
-    plot = tab.locator(".plot > div").first
-    tab.wait_for_function("document.querySelector('.plot > div.more-right')")
-    assert "rgb(0, 0, 0) 0px, rgb(0, 0, 0) calc(100% - " in plot.evaluate(FADES)
-    plot.evaluate("one => (one.scrollLeft = one.scrollWidth)")
-    tab.wait_for_function("document.querySelector('.plot > div.more-left:not(.more-right)')")
-    table = tab.locator(".scroll").first
-    assert table.evaluate("one => one.classList.contains('more-right')")
-    box = table.bounding_box()
-    for paper in table.locator(".paper").all():
-        inside = paper.bounding_box()
-        assert inside["x"] + inside["width"] <= box["x"] + box["width"] + 1
-    tab.set_viewport_size({"width": 1280, "height": 800})
-    tab.wait_for_function("!document.querySelector('.plot > .more-right, .plot > .more-left')")
-    assert plot.evaluate(FADES) == "none"
 
 
 @pytest.mark.parametrize("name", ["comparison", "colony"])

@@ -7,10 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from paper.baselines import (
-    bound_rows,
-    policy_rows,
-)
+from paper.baselines import bound_rows, policy_rows
 from plain_runs import rollout
 
 from taichi_ants.analysis.bounds import episodes

@@ -12,17 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from paper.baselines import Baseline
 from paper.comparison import DYNA_P5, FIGURE_1, VARIANTS
-from paper.figures import (
-    BEHAVIOUR_LOOKS,
-    learning_curves,
-    return_against_deliveries,
-)
-from synthetic_comparison import (
-    Made,
-    build,
-    change,
-    unchanged,
-)
+from paper.figures import BEHAVIOUR_LOOKS, learning_curves, return_against_deliveries
+from synthetic_comparison import Made, build, change, unchanged
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, OTHER
 from taichi_ants.analysis.statistics import interquartile_mean
@@ -98,9 +89,7 @@ def test_learning_curves_are_interquartile_means_of_growing_spans(comparison: Ma
     assert "the learning rate is 0.01, the discount 0.9, epsilon 0.3 and its decay 0.995" in words
 
 
-def test_returns_against_deliveries_shows_what_runs_do_and_baselines(
-    comparison: Made,
-) -> None:
+def test_returns_against_deliveries_shows_what_runs_do_and_baselines(comparison: Made) -> None:
     behaviours = comparison.behaviours.copy()
     behaviours[-1, :2], behaviours[3, 4] = CIRCLES, OTHER
     comparison = replace(comparison, behaviours=behaviours)

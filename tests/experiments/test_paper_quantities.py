@@ -7,12 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from paper.comparison import FIGURE_1, Q_LEARNING, SARSA
-from paper.quantities import (
-    READS,
-    grids_of,
-    rank_correlation,
-    share_above,
-)
+from paper.quantities import READS, grids_of, rank_correlation, share_above
 from synthetic_comparison import build, remeasured, subset, unchanged
 
 AT_FIGURE_1, MEAN_OF_ALL = READS["at figure 1"], READS["mean of all"]

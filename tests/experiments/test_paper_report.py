@@ -17,12 +17,7 @@ from paper.report import (
     heading,
     report,
 )
-from paper.table2 import (
-    shown_position,
-    summarise,
-    summarise_behaviours,
-    table2,
-)
+from paper.table2 import shown_position, summarise, summarise_behaviours, table2
 from synthetic_comparison import build, change, remeasured, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, WALKS

@@ -6,15 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from paper.comparison import (
-    DYNA_P3,
-    FIGURE_1,
-    Q_LEARNING,
-    SARSA,
-    VARIANTS,
-    Comparison,
-    Variant,
-)
+from paper.comparison import DYNA_P3, FIGURE_1, SARSA, VARIANTS, Comparison, Variant
 from paper.table2 import (
     Line,
     best_of,
@@ -25,10 +17,10 @@ from paper.table2 import (
     summarise,
     table2,
 )
-from synthetic_comparison import build, remeasured, subset, unchanged
+from synthetic_comparison import build, remeasured, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, OTHER
-from taichi_ants.analysis.statistics import bootstrap_interval, interquartile_mean
+from taichi_ants.analysis.statistics import bootstrap_interval
 
 
 def lines_of(comparison: Comparison, draws: int = 50) -> list[Line]:
@@ -70,16 +62,6 @@ def test_the_winners_other_figures_belong_to_the_same_run(comparison: Comparison
     assert set(zip(*best.values(), strict=True)) <= set(runs)
 
 
-def test_seeds_of_the_configurations_are_independent() -> None:
-    """Two configurations that are good on different seeds: together good with 3/4, not always."""
-    two = subset(build({"truncates": unchanged}, seeds=2), [0, 1], 2, 120)
-    two.arrays["returns"][...] = 0
-    two.arrays["returns"][0, 0] = two.arrays["returns"][1, 1] = 50
-    two = remeasured(two)
-    best = best_of(two, "truncates", Q_LEARNING, draws=20_000)
-    assert (best["return_last50"] == 50).mean() == pytest.approx(0.75, abs=0.01)
-
-
 def test_table2_lines(comparison: Comparison) -> None:
     lines, summary = lines_of(comparison, 2000), summarise(comparison)
     assert [(line.delivery, line.summary.row.variant) for line in lines] == [
@@ -101,20 +83,6 @@ def test_table2_lines(comparison: Comparison) -> None:
         )
     percentile = line["best_run_return_last50_paper_percentile"]
     assert percentile == best_run(best["return_last50"], 47.3)["paper_percentile"]
-
-
-def test_what_stands_for_a_learner(comparison: Comparison) -> None:
-    position = shown_position(comparison, "terminates", SARSA)
-    assert comparison.rows[position].point == FIGURE_1
-    garden = replace(comparison, world="garden.txt")
-    rows = garden.positions("terminates", SARSA)
-    best = shown_position(garden, "terminates", SARSA)
-    typical = interquartile_mean(garden.measures["return_last50"][rows])
-    assert best == rows[int(typical.argmax())]
-    lucky = replace(garden, arrays={name: one.copy() for name, one in garden.arrays.items()})
-    lucky.arrays["returns"][rows[3], 0] = 4000  # one far run does not choose
-    lucky = remeasured(lucky)
-    assert shown_position(lucky, "terminates", SARSA) != rows[3] or best == rows[3]
 
 
 def some_circle(comparison: Comparison) -> Comparison:

@@ -20,14 +20,14 @@ from learning import (
 )
 from named_states import parse_state
 from PIL import Image
-from policy_sheet import clarity, learned, policy_sheet, usual_spread
+from policy_sheet import clarity, policy_sheet, usual_spread
 
 from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
 from taichi_ants.rendering import Episode, save_animation, text
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
-from taichi_ants.task import Observation, Rewards, Task, observations
-from taichi_ants.task.constants import ACTION_NAMES, PICK_UP, RIGHT
+from taichi_ants.task import Task, observations
+from taichi_ants.task.constants import PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES
 from taichi_ants.worlds import paper
 
@@ -103,20 +103,7 @@ def test_all_stages_fit(size, tmp_path) -> None:
     assert groups == {(1280, 720): [4, 1], (400, 900): [2, 2], (64, 64): [2, 2]}.get(size, [4, 1])
 
 
-def test_the_legend_of_learning_tells_the_rewards_of_the_task(lines) -> None:
-    task = Task(rewards=Rewards(shaping=2, deliver=50, failed=-4))
-    checkpoints = learning_checkpoints(paper(), CONFIG, 0, (0,), 5, task)
-    next(learning_frames(checkpoints, (1400, 600)))
-    told = {"T onto a trail +2", "Q delivery +50", "F food +3", "X blocked, in vain -4"}
-    assert told <= set(lines)
-
-
 FIVE = observations.get("five_cells")
-HARDLY_VISITED = [
-    (0.0, 0.0, 1.97e-5, 0.0, 0.0),
-    (2.6e-6, 0.0, 0.0, 0.0, 0.0),
-    (-0.002, 0.0, -0.001, -0.001, -0.001),  # the best is the one that was never tried
-]
 
 
 @pytest.fixture
@@ -146,23 +133,6 @@ def test_the_usual_spread() -> None:
     unreachable = next(index for index in range(128) if index not in REACHABLE_STATES)
     table[unreachable] = (100.0, 0.0, 0.0, 0.0, 0.0)
     assert usual_spread(table, Task().sees) == pytest.approx(3.0)
-
-
-@pytest.mark.parametrize("values", HARDLY_VISITED)
-def test_a_hairline_is_no_clear_choice(values) -> None:
-    assert clarity(np.array(values), 0.4) < 0.01
-    assert not learned(np.array(values), 0.4)
-    assert learned(np.array(values), 100 * 2.5e-6)
-    table = random_policy()
-    table[parse_state("foraging E F E")] = (0.0, 0.0, 0.0, 0.8, 0.0)
-    blank = policy_sheet(table)
-    place = parse_state("foraging O O O")
-    table[place] = values
-    hardly = policy_sheet(table)
-    table[place] = (0.0, 0.8, 0.0, 0.0, 0.0)
-    clear = policy_sheet(table)
-    assert (hardly == blank).all()
-    assert coloured(clear, CHOSEN).sum(axis=1).max() > 60
 
 
 def all_known() -> np.ndarray:
@@ -206,16 +176,6 @@ def test_the_bar_of_a_state_is_as_long_as_its_choice_is_clear() -> None:
     assert 15 <= coloured(policy_sheet(table), CHOSEN).sum(axis=1).max() < 40  # a fifth of 112
 
 
-def test_a_sheet_shows_only_what_was_learned() -> None:
-    table = random_policy()
-    table[list(REACHABLE_STATES[:30]), RIGHT] = 1.0
-    one = random_policy()
-    one[parse_state("foraging E F E"), PICK_UP] = 1.0
-    heights = [policy_sheet(one).shape[0], policy_sheet(table).shape[0]]
-    heights.append(policy_sheet(all_known()).shape[0])
-    assert heights == sorted(set(heights))
-
-
 def test_text_on_a_sheet_says_what_it_shows(lines) -> None:
     table = random_policy()
     table[parse_state("foraging E F E"), PICK_UP] = 1.0
@@ -240,23 +200,6 @@ def test_the_sheet_of_an_observation_of_more_cells(lines) -> None:
         policy_sheet(random_policy(), task=Task(observation="five_cells"))
 
 
-def test_of_very_many_states_a_sheet_shows_the_first_and_says_so(lines) -> None:
-    table = np.zeros((FIVE.n_states, 5), dtype=np.float32)
-    table[:300, RIGHT] = 1.0
-    policy_sheet(table, task=Task(observation="five_cells"))
-    assert "300 of 1024 states learned; 128 are shown" in lines
-    assert lines.count("right") == 128
-
-
-def test_states_with_names_of_another_form_are_written_out(monkeypatch, lines) -> None:
-    own = Observation("own", 4, lambda view: 0, name_of=lambda row: f"carrying crumb number {row}")
-    monkeypatch.setattr(Task, "sees", own)
-    monkeypatch.setattr(Task, "n_states", 4)
-    policy_sheet(np.eye(4, 5))
-    assert {f"crumb number {row}" for row in range(4)} <= set(lines)
-    assert "4 of 4 states learned" in lines
-
-
 @pytest.mark.parametrize("name", ["ants_seen", "trail_levels", "paper"])
 def test_letters_of_their_own_are_explained_on_the_sheet_and_in_the_panel(name, lines) -> None:
     task = Task(name)
@@ -270,19 +213,6 @@ def test_letters_of_their_own_are_explained_on_the_sheet_and_in_the_panel(name, 
     assert beside.get("", "") == task.sees.letters
     assert {word.strip(",") for word in task.sees.letters.split()} >= strange
     assert bool(strange) == (name != "paper")
-
-
-@pytest.mark.parametrize("best", [(0, 1, 3), (0, 1, 2, 4), (0, 1, 2, 3)])
-def test_no_tie_is_cut_off(best, monkeypatch) -> None:
-    table, written = random_policy(), []
-    table[parse_state("foraging E F E"), list(best)] = 1.0
-    monkeypatch.setattr(text, "write", lambda *given, **more: written.append((given, more)))
-    policy_sheet(table)
-    (found,) = ((given, more) for given, more in written if " / " in given[1])
-    (tile, words, _, _, size, *_), more = found
-    assert words == " / ".join(ACTION_NAMES[action] for action in best)
-    assert size >= text.SMALLEST
-    assert text.width(words, size) <= more.get("room", tile.shape[1])
 
 
 # The command lines.

@@ -19,7 +19,6 @@ def test_it_has_a_twin_in_the_reference(name):
     learner, twin = learners.get(name), reference.LEARNERS[name]
     assert learner.name == name
     assert learner.draws_next_action == twin.draws_next_action
-    assert (learner.td_error is not None) == twin.shares
     usual = {field.name: field.default for field in fields(learner.hyperparameters)}
     assert usual == twin.hyperparameters
 

@@ -9,13 +9,7 @@ from random_colonies import random_colony
 from taichi_ants import Colony, TrainingConfig, measures, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.measures import (
-    MEASURES,
-    measured,
-    new_deliveries,
-    occupancy,
-    synchrony,
-)
+from taichi_ants.reference.measures import MEASURES, measured, new_deliveries, occupancy, synchrony
 from taichi_ants.task import foraging
 
 EVERY, EPISODES, TICKS = 3, 2, 20

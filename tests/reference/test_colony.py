@@ -7,7 +7,7 @@ from colonies import act, begun, load, training
 
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Task
-from taichi_ants.task.constants import FORWARD, GIVE
+from taichi_ants.task.constants import GIVE
 from taichi_ants.task.events import Event
 from taichi_ants.worlds import World
 
@@ -44,19 +44,3 @@ def test_by_default_trails_fall_only_where_nobody_learns(sharing, level):
     colony.begin_episode()
     act(colony, GIVE)
     assert colony.world.trail.level((1, 0, 0)) == 19 - level
-
-
-@pytest.mark.parametrize("learner", ["sarsa_lambda", "n_step_sarsa"])
-def test_what_a_learner_remembers_of_an_episode_ends_with_it(learner):
-    # Two steps of the first episode wait, or leave traces. The first step of the second one, from
-    # an untouched state, moves its own value alone, or none yet.
-    world = World((5, 5, 5), (0, 0, 4), obstacles=[(1, 0, 0)], ants=[((0, 0, 0), 0)])
-    colony = begun(world, training(learner), sharing="independent")
-    act(colony, GIVE)
-    act(colony, FORWARD)
-    before = colony.q_values[0]
-    colony.begin_episode()
-    act(colony, 3)
-    changed = colony.q_values[0] != before
-    assert changed.sum() == (learner == "sarsa_lambda")
-    assert changed[:, 3].sum() == changed.sum()

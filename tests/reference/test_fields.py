@@ -60,16 +60,6 @@ def test_time_without_food_counts_from_the_start_and_from_a_delivery():
     assert levels(colony, "home") == {(2, 3, 0): 100, cell: 90}
 
 
-def test_a_failed_pick_up_marks_the_cell_of_an_ant_without_food_only():
-    colony = begun_with(empty=Field(deposited_when="failed_pick_up", evaporation="none"))
-    load(colony, 0)
-    act(colony, PICK_UP)
-    assert levels(colony, "empty") == {}
-    colony.ants[0].carries = False
-    act(colony, PICK_UP)
-    assert levels(colony, "empty") == {(2, 3, 0): 250}
-
-
 def test_a_dead_end_is_marked_by_what_the_ant_saw_before_it_turned():
     rocks = [(3, 3, 0), (2, 4, 0), (3, 4, 0), (2, 2, 0)]
     world = World((9, 9, 1), (8, 8, 0), foods=[(0, 8, 0)], obstacles=rocks, ants=[((2, 3, 0), 1)])
@@ -89,12 +79,3 @@ def test_an_ant_with_food_sees_the_homing_field_in_place_of_the_compass():
         home.lay((2, 2, 0), 60)  # left of the ant
         load(colony, 0)
         assert colony.ants[0].paper_state == 64 + 16 * left + 4 * 2
-
-
-def test_an_ant_without_food_sees_the_outbound_field_in_place_of_the_trail():
-    world = World((9, 9, 1), (8, 8, 0), [(4, 8, 0)], trails=[((3, 3, 0), 9)], ants=[((2, 3, 0), 0)])
-    colony = begun(world, fields={"scout": Field("none")}, outbound_cue="scout")
-    assert colony.ants[0].paper_state == 0
-    colony.world.pheromones["scout"].lay((3, 3, 0), 1)
-    colony.observe(colony.ants[0])
-    assert colony.ants[0].paper_state == 4 * 2

@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from colonies import act, begun, foods_of, load, n_draws
+from colonies import act, begun, foods_of, load
 
 from taichi_ants.grid.constants import STREAM_QUEEN
 from taichi_ants.reference.geometry import neighbour
 from taichi_ants.reference.random_stream import RandomStream, stream_state
-from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
+from taichi_ants.task.constants import GIVE, PICK_UP
 from taichi_ants.worlds import World
 
 ANT, SOURCE, QUEEN = (0, 0, 0), (1, 1, 0), (0, 0, 3)
@@ -25,12 +25,6 @@ def waiting(colony):
     return [source.waiting_since for source in colony.food_sources.food_sources]
 
 
-def turn(colony, heading, slot=0):
-    ant = colony.ants[slot]
-    ant.heading = heading
-    colony.observe(ant)
-
-
 @pytest.mark.parametrize("delay", [0, 1, 3])
 def test_food_grows_back_so_many_ticks_after_it_was_taken(delay):
     colony = begun(world(), regrowth=delay)
@@ -42,20 +36,6 @@ def test_food_grows_back_so_many_ticks_after_it_was_taken(delay):
         there.append(foods_of(colony) == {SOURCE})
     assert there == [ticks >= delay for ticks in range(5)]
     assert (colony.record.regrown, waiting(colony)) == (1, [None])
-
-
-def test_food_waits_while_an_ant_stands_on_its_place():
-    colony = begun(world(), regrowth=1)
-    act(colony, PICK_UP)
-    assert waiting(colony) == [0]
-    turn(colony, 1)
-    act(colony, FORWARD)  # enters the place in the very tick in which it would grow back
-    assert colony.ants[0].cell == SOURCE
-    act(colony, GIVE)
-    assert (foods_of(colony), waiting(colony)) == (set(), [0])
-    act(colony, FORWARD)  # leaves
-    assert (foods_of(colony), waiting(colony)) == ({SOURCE}, [None])
-    assert colony.record.regrown == 1
 
 
 def test_food_dropped_elsewhere_does_not_grow_back():
@@ -100,19 +80,6 @@ def test_a_pile_moves_as_one(heading):
     assert [source.cell for source in colony.food_sources.food_sources] == [
         neighbour(c, heading) for c in LINE
     ]
-
-
-@pytest.mark.parametrize("pile_move_interval", [1, 2, 3])
-def test_it_moves_every_so_many_ticks(pile_move_interval):
-    colony = wandering([(0, 0, 0)], 0, 0, pile_move_interval=pile_move_interval)
-    places = []
-    for _ in range(2 * pile_move_interval):
-        act(colony, GIVE)
-        places += foods_of(colony)
-    assert places == [(0, 0, 0)] * (pile_move_interval - 1) + [(1, 0, 0)] * pile_move_interval + [
-        (2, 0, 0)
-    ]
-    assert n_draws(colony.queen_stream.state, stream_state(seed_of(0, 0), STREAM_QUEEN, 0)) == 2
 
 
 @pytest.mark.parametrize("ahead", ["ant", "queen", "outside"])

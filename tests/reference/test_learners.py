@@ -165,24 +165,6 @@ def test_prioritized_sweeping_by_hand():
     assert values_of(learner) == {(0, 0): 2.5, (1, 0): 8, (2, 0): 8}
 
 
-def test_prioritized_sweeping_goes_on_from_errors_above_the_threshold_alone():
-    # (0, 0) gets an error of 0.5 * 4 = 2 by the update of (1, 0).
-    for threshold, value in ((1.75, 1), (2.0, 0)):
-        learner = made("prioritized_sweeping", planning_steps=2, threshold=threshold)
-        learn(learner, transition(0, 0, 0, 1), transition(1, 0, 8, 2))
-        assert learner.rows[0][0] == value
-
-
-def test_prioritized_sweeping_forgets_an_old_priority_where_the_pair_is_seen_again():
-    learner = made("prioritized_sweeping", planning_steps=1, threshold=0.5)
-    learn(learner, transition(0, 0, 0, 1), transition(3, 0, 0, 1))
-    # (1, 0): error 8, so 4; (0, 0) and (3, 0) wait with 0.5 * 4 = 2.
-    learn(learner, transition(1, 0, 8, 2))
-    # (0, 0) again, with the reward -1: error -1 + 2 = 1. So (3, 0) is first: 0 + 0.5 * 2.
-    learn(learner, transition(0, 0, -1, 1))
-    assert values_of(learner) == {(1, 0): 4, (3, 0): 1}
-
-
 # The first draw from state 0 is 0xE220A839 (0.883 of the range), 0x7B1DCDAF (0.481); from state
 # GAMMA it is 0x6E789E6A (0.432), 0xA1B965F4 (0.632).
 @pytest.mark.parametrize(

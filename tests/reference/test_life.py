@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from colonies import act, begun, cells_of, foods_of, load, n_draws
 
@@ -117,19 +116,3 @@ def test_a_carrying_ant_leaves_its_food_where_it_dies():
     [last, _] = colony.transitions
     assert last.next_state == 64 + 16 + 4 * 3 + last.next_state % 4
     assert last.truncated
-
-
-def test_a_dying_ant_learns_from_what_it_sees_last_as_if_it_lived_on():
-    # Forward onto an empty cell, from where it sees a rock ahead, E O E. Q(E O E, left) = 4, so the
-    # target is 0 + 0.5 * 4 and the value of forward 0 + 0.5 * 2.
-    world = World((5, 5, 5), (0, 0, 4), obstacles=[(2, 0, 0)], ants=[((0, 0, 0), 0)])
-    q_values = np.zeros((128, 5), np.float32)
-    q_values[4, 0] = 4
-    colony = begun(world, sharing="shared", q_values=q_values, lifespan=1)
-    act(colony, FORWARD)
-    assert colony.ants == {}
-    [step] = colony.transitions
-    assert (step.pair, step.reward, step.next_state) == ((0, FORWARD), 0, 4)
-    assert (step.terminated, step.truncated) == (False, True)
-    assert step.td_error == 2
-    assert colony.q_values[0, FORWARD] == 1

@@ -12,8 +12,8 @@ from transitions import transition
 
 from taichi_ants.learners.config import update_weights
 from taichi_ants.reference import LEARNERS
+from taichi_ants.reference.learners import learn_together, mean_error
 from taichi_ants.reference.random_stream import RandomStream
-from taichi_ants.reference.sharing import learn_together, mean_error
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
 

@@ -9,7 +9,7 @@ from colonies import act, begun, load
 from taichi_ants.reference.geometry import neighbour
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Pheromone, Task
-from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
+from taichi_ants.task.constants import FORWARD, PICK_UP
 from taichi_ants.worlds import World
 
 MIDDLE = (0, 0, 0)
@@ -52,15 +52,6 @@ def test_exponential_evaporation_halves(half_life):
         # A rounding of 2**-24 per tick at most, and one of the factor.
         assert float(trail.level(MIDDLE)) == pytest.approx(expected, rel=3e-7 * ticks)
     assert type(trail.level(MIDDLE)) is np.float32
-
-
-def test_what_falls_below_one_is_gone():
-    trail = trail_of(plain_world(level=8), Pheromone("exponential", half_life=1))
-    levels = []
-    for _ in range(5):
-        levels.append(float(trail.level(MIDDLE)))
-        trail.tick()
-    assert levels == [8, 4, 2, 1, 0]
 
 
 def test_one_tick_of_diffusion_by_hand():
@@ -122,23 +113,6 @@ def test_the_deposit_of_a_carrying_ant(pheromone, bare, trodden):
     second = colony.ants[0].cell
     assert second != first
     assert colony.world.trail.level(second) == trodden
-
-
-def test_dense_levels_are_seen_from_one_on_and_from_half_of_the_strongest():
-    # 250 * 0.5 = 125 is half of 250, 124.9 is not; a level of 0.9 is no trail at all.
-    world = World((5, 5, 5), FAR_QUEEN, ants=[(MIDDLE, 1)])
-    colony = begun(world, pheromone=Pheromone("none", diffusion=1e-12))
-    for levels, state in (
-        ((250, 125, 124.9), 32 + 8),
-        ((0.9, 0, 0), 0),
-        ((0.9, 1.0, 1.5), 8 + 2),
-        ((2.0, 0.99, 1.0), 32 + 2),
-    ):
-        for heading, level in enumerate(levels):
-            trail = colony.world.trail
-            trail._levels[trail._index[neighbour(MIDDLE, heading)]] = level
-        act(colony, GIVE)
-        assert colony.ants[0].state == state
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from colonies import GAMMA, training
+from colonies import training
 from plain_runs import train
 
 from taichi_ants.reference import LEARNERS
@@ -44,11 +44,6 @@ def train_once(learning, delivery="terminates", max_steps=600, rng_state=0):
     return train(TWO_STEPS, learning, 0, 1, max_steps, task, start_from=begun)
 
 
-def draws(run):
-    """How many draws the run made from state 0: each adds GAMMA."""
-    return next(n for n in range(100) if n * GAMMA % 2**64 == run.rng_state)
-
-
 # All learners see the same errors here: a' is the best action, and epsilon is 0.
 #   Step 0: 3 + 0.5 * 2 - 1 = 3.
 #   Step 1, terminates: 10 - 2 = 8; truncates: 10 + 0.5 * 4 - 2 = 10.
@@ -59,19 +54,3 @@ def test_td_errors_by_delivery_setting(learner, delivery, last):
     assert [step.td_error for step in run.trace] == [3.0, last]
     assert [step.terminated for step in run.trace] == [False, delivery == "terminates"]
     assert run.deliveries == [1]
-
-
-@pytest.mark.parametrize(
-    ("learner", "delivery", "max_steps", "expected"),
-    [
-        ("q_learning", "terminates", 600, 2),  # one for each choice
-        ("expected_sarsa", "truncates", 600, 2),
-        ("sarsa", "terminates", 600, 2),  # the second is a' of the first step, none at the end
-        ("sarsa", "truncates", 600, 3),  # a' at the delivery, for the target
-        ("sarsa", "terminates", 1, 2),  # a' at truncation, for the target
-        ("dyna_q", "terminates", 600, 8),  # 2 choices and 2 * 3 planning steps
-    ],
-)
-def test_how_many_draws_are_made(learner, delivery, max_steps, expected):
-    run = train_once(training(learner), delivery, max_steps)
-    assert draws(run) == expected

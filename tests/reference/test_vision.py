@@ -16,7 +16,7 @@ from __future__ import annotations
 import pytest
 
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.observations import cells_in_view, observe
+from taichi_ants.reference.observations import observe
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Pheromone, Task
 from taichi_ants.worlds.world import World
@@ -28,13 +28,6 @@ FAR = (0, 0, 4)  # a queen behind the ant, at distance 4; from L 5, from M 5, fr
 def sees(carries=False, cell=A, heading=1, queen=FAR, **contents) -> int:
     world = World((5, 5, 5), queen, **contents)
     return observe(WorldState(world, Task()), Ant(cell, heading, carries))
-
-
-def test_the_view_is_left_forward_right():
-    assert cells_in_view(Ant(A, 1)) == [L, M, R]
-    # Heading 0 looks to headings 5, 0, 1, and heading 5 to 4, 5, 0.
-    assert cells_in_view(Ant(A, 0)) == [(1, 0, 1), (1, 0, 0), (1, 1, 0)]
-    assert cells_in_view(Ant(A, 5)) == [(0, 0, 1), (1, 0, 1), (1, 0, 0)]
 
 
 @pytest.mark.parametrize(

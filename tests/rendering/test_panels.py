@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from named_states import parse_state
 
 from taichi_ants import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
@@ -58,25 +57,6 @@ def test_text_keeps_off_the_edges(size) -> None:
     assert (frame[:2] == 255).all()
     assert (frame[-2:] == 255).all()
     assert (frame[:, -2:] == 255).all()
-
-
-def test_letters_lie_in_the_cells_in_view() -> None:
-    snapshot = at_start(WORLD)
-    scene = Scene(WORLD.grid, (320, 320))
-    plain = scene.draw(snapshot)
-    seen = Status((), state=parse_state("foraging E T O"))
-    changed = (scene.draw(snapshot, seen) != plain).any(axis=2)
-    rows, columns = np.nonzero(changed)
-    # The ant of the paper's world stands at (0, 8, 8) and looks up.
-    centres = places_of(WORLD, [(0, 7, 8), (0, 7, 7), (0, 8, 7)], 320)
-    places = np.stack([columns, rows], axis=-1) + 0.5
-    away = np.linalg.norm(places[:, None] - centres, axis=2).min(axis=1)
-    assert away.max() < Rasteriser(WORLD.grid, 320, 320, 5).hexagon + 1
-    for x, y in centres:
-        around = changed[int(y) - 6 : int(y) + 6, int(x) - 6 : int(x) + 6]
-        assert around.sum() > 12
-    plainer = Scene(WORLD.grid, (320, 320), overlay=False)
-    assert (plainer.draw(snapshot, seen) == plain).all()
 
 
 @pytest.mark.parametrize("size", [(320, 320), (320, 200), (200, 320), (1280, 720)])

@@ -83,16 +83,6 @@ def test_the_axis_has_a_name_and_a_unit(label: str) -> None:
     assert max(map(len, map(unescape, named))) <= 58
 
 
-def test_what_is_too_small_to_matter_is_marked() -> None:
-    one = finding(above(1.0), 0.1, -0.5, 0.5)
-    drawn = numbers(drawing(one))
-    assert drawn["small"][0] < drawn["span"][0] < drawn["span"][1] < drawn["small"][1]
-
-
 @pytest.mark.parametrize("ends", [(1.0, np.nan, np.nan), (np.nan, np.nan, np.nan)])
 def test_without_an_interval_there_is_no_drawing(ends) -> None:
     assert drawing(finding(above(), *ends)) == ""
-
-
-def test_one_value_only_is_drawn() -> None:
-    assert "circle" in drawing(finding(above(), 0.0, 0.0, 0.0))

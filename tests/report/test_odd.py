@@ -108,18 +108,6 @@ def test_every_setting_that_differs_has_its_value(seed):
         assert found.get(name) == (text if is_used else None), name
 
 
-def test_the_headings_are_those_of_the_protocol():
-    headings = [
-        *("1. Purpose and patterns", "2. Entities, state variables and scales"),
-        *("3. Process overview and scheduling", "4. Design concepts"),
-        *("4.1 Basic principles", "4.2 Emergence", "4.3 Adaptation", "4.4 Objectives"),
-        *("4.5 Learning", "4.6 Prediction", "4.7 Sensing", "4.8 Interaction", "4.9 Stochasticity"),
-        *("4.10 Collectives", "4.11 Observation"),
-        *("5. Initialization", "6. Input data", "7. Submodels"),
-    ]
-    assert re.findall("^##+ (.*)$", of_task(Task()), re.M) == headings
-
-
 def test_parameters_have_the_unit_and_the_meaning_of_their_declaration():
     fades = {"evaporation": "exponential", "half_life": 7.5}
     task = foraging().replace(pheromone=fades, fields={"home": {}}, homing_cue="home")
@@ -183,14 +171,6 @@ def test_a_study_without_learning_has_no_parameters_of_learning():
     assert "| castes of ants | 2: alpha, beta |" in text
     assert "| cell | level of `a` | at least 0 | level |" in text
     assert "| `entropy.a` | entropy of each pheromone field" in text
-
-
-def test_the_trail_has_no_view_if_nobody_follows_it():
-    task = Task(fields={"a": {}}).replace(outbound_cue="a")
-    assert "task.pheromone.view" not in values_in(of_task(task))
-    assert values_in(of_task(task))["task.fields.a.view"] == "half"
-    follows = task.replace(castes={"one": {"outbound_cue": "trail"}})
-    assert values_in(of_task(follows))["task.pheromone.view"] == "half"
 
 
 def test_carriers_follow_has_its_value():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from random_choices import NOISE
 from random_colonies import random_colony
-from same_colonies import assert_equal
+from same_colonies import every_tick
 
 from taichi_ants import Colony
 from taichi_ants.reference import ReferenceColony
@@ -54,16 +54,7 @@ def test_every_tick_with_rules_of_users(model):
         options = {**drawn.population, "sharing": drawn.sharing, "q_values": q_values}
         colony = Colony(*given, **options)
         plain = ReferenceColony(*given, **options)
-        for ticks in (12, 9):
-            colony.begin_episode(ticks)
-            plain.begin_episode()
-            assert_equal(colony, plain)
-            for tick in range(ticks):
-                if not plain.over:
-                    colony.tick()
-                    plain.tick(last=tick == ticks - 1)
-                    assert_equal(colony, plain)
-            colony.end_episode()
-            plain.end_episode()
-            delivered += plain.records[-1].deliveries
+        for _ in every_tick(colony, plain, (12, None), (9, None)):
+            pass
+        delivered += sum(record.deliveries for record in plain.records)
     assert delivered > 0

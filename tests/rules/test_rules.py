@@ -23,7 +23,7 @@ from taichi_ants import (
 )
 from taichi_ants.engines import own_rules as own_rules_of_kernels
 from taichi_ants.interventions import SetTask
-from taichi_ants.reference import own_observations
+from taichi_ants.reference import own_rules
 from taichi_ants.rules import pick, registry
 from taichi_ants.rules.inputs import KINDS
 from taichi_ants.task import Choice, Observation, observations
@@ -309,7 +309,7 @@ def test_an_observation_is_compared_with_the_reference(monkeypatch):
     observations.register(Observation("homely", 256, homely, reads=("B", "trail")))
     check = check_observation("homely")
     assert str(check) == "homely (reads the fields B and trail): 360 ticks of 6 colonies: equal"
-    monkeypatch.setattr(own_observations, "codes_seen", lambda *_: [0, 0, 0])
+    monkeypatch.setattr(own_rules, "codes_seen", lambda *_: [0, 0, 0])
     check = check_observation("homely")
     assert check.ticks < 360
     assert check.difference.startswith("seed 0, tick ")

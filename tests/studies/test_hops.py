@@ -8,7 +8,7 @@ import traceback
 import paper.table2
 from command_lines import ROOT, call
 
-from taichi_ants.engines.arguments import Launch
+from taichi_ants.engines.launch import Launch
 from taichi_ants.measures.finished import Run
 from taichi_ants.studies.points import RunPoint
 from taichi_ants.studies.store import Store

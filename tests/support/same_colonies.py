@@ -92,7 +92,7 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     assert {(int(n), int(k)): int(apart[n, k]) for n, k in np.argwhere(apart)} == record.delivered
     by_caste = dict(enumerate(outcome.caste_deliveries[0, world].tolist()))
     assert {caste: n for caste, n in by_caste.items() if n} == record.by_caste
-    assert colony.stimuli[world].tolist() == plain.stimuli
+    assert colony.stimuli[world].tolist() == plain.world.stimuli
     first = world * colony.n_food_sources
     food_sources = colony.arrays["food_sources"][:, first : first + row[WorldRow.FOOD_SOURCES]]
     theirs = plain.food_sources.food_sources[: food_sources.shape[1]]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +17,6 @@ from taichi_ants.task import Life, Pheromone
 from taichi_ants.task.constants import ACTION_NAMES
 from taichi_ants.task.events import Event
 from taichi_ants.viewer import Recording, page, record_colony, record_trace
-from taichi_ants.viewer.page import SCRIPTS, part
 
 pytestmark = pytest.mark.browser
 
@@ -292,19 +290,6 @@ def test_light_and_dark(browser, episode):
     dark.press("t")
     assert dark.read(look) == "dark"
     dark.close()
-    light = Page(browser, episode[0], color_scheme="light", reduced_motion="reduce")
-    assert light.read(look) == "light"
-    light.tab.keyboard.press("Space")  # ants do not glide
-    shares = (
-        "stage => { const s = []; const draw = viewer.stage.draw.bind(viewer.stage);"
-        "viewer.stage.draw = (m, share, marks) => { s.push(share); draw(m, share, marks); };"
-        "return new Promise((done) => setTimeout(() => done(s), 400)); }"
-    )
-    assert set(light.read(shares)) <= {0}
-    light.tab.keyboard.press("Space")
-    light.tab.emulate_media(color_scheme="dark")
-    light.tab.wait_for_function("document.documentElement.dataset.theme === 'dark'")
-    light.close()
 
 
 def test_cells_have_the_colours_of_what_they_hold(crowd, colony):
@@ -350,21 +335,3 @@ def test_the_page_asks_for_nothing_and_runs_no_text(browser, episode):
     tab.evaluate("fetch('https://example.org').catch(() => 0)")
     assert any("Content Security Policy" in fault for fault in faults)
     context.close()
-
-
-def test_the_script_is_whole():
-    """Each part is in the page once, in an order in which classes stand before their use."""
-    whole = "".join(map(part, SCRIPTS))
-    for name in re.findall(r"new ([A-Z]\w+)\(", whole):
-        assert f"class {name} " in whole or name in (
-            *("Path2D", "Map", "Set", "Blob", "Response", "DataView", "TextDecoder"),
-            *("DecompressionStream", "Uint8Array", "Uint32Array", "Int32Array", "Float32Array"),
-            *(
-                "TextEncoder",
-                "CompressionStream",
-                "ResizeObserver",
-                "AbortController",
-                "Promise",
-                "Error",
-            ),
-        )

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from taichi_ants.files.tables import column
 from taichi_ants.measures.series import Series
-from taichi_ants.measures.tidy import Measured, Tidy, seed_array
+from taichi_ants.measures.tidy import Measured, Tidy
 from taichi_ants.records import Record
 
 
@@ -68,7 +69,7 @@ class ColonyEpisodes(Record, Tidy):
         else:
             worlds, episodes, ticks = series.worlds, series.episodes, series.ticks
             values, plotted = dict(series.values), tuple(series.values)
-        seeds = seed_array(self.seeds)[worlds]
+        seeds = column(self.seeds)[worlds]
         index = {"world": worlds, "seed": seeds, "episode": episodes, "tick": ticks}
         return Measured(
             index=index,

@@ -55,9 +55,9 @@ def at_start(world: World) -> np.ndarray:
     from scipy.sparse.csgraph import connected_components
 
     grid, cells = world.grid, world.grid.index(world.foods)
-    place = np.full(grid.size, -1, np.int64)
-    place[cells] = np.arange(len(cells))
-    neighbours = place[cells[:, None] + grid.offsets[None, :]]
+    number_at = np.full(grid.size, -1, np.int64)
+    number_at[cells] = np.arange(len(cells))
+    neighbours = number_at[cells[:, None] + grid.offsets[None, :]]
     rows, columns = np.nonzero(neighbours >= 0)
     links = (rows, neighbours[rows, columns])
     graph = coo_array((np.ones(len(rows), np.int8), links), shape=(len(cells),) * 2)

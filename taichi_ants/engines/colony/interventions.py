@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
+from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, FoodRow, NestRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
@@ -40,23 +41,7 @@ from taichi_ants.grid.constants import (
 )
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
-from taichi_ants.interventions import (
-    AddAnts,
-    Clear,
-    Episode,
-    Intervention,
-    Move,
-    Place,
-    RemoveAnts,
-    SetAnts,
-    SetEpsilon,
-    SetLearningRate,
-    SetPolicy,
-    SetTask,
-    SetTrail,
-    flat_index,
-    indices,
-)
+from taichi_ants.interventions import Intervention, flat_indices
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.task.field import TRAIL
@@ -87,7 +72,7 @@ class _World:
         self.all, self.w, self.colony = interventions, w, interventions.colony
         self.rows = self.colony.arrays["worlds"][:, w]
 
-    def place(self, change: Place) -> Change:
+    def place(self, change: language.Place) -> Change:
         """Place rock or food; see `_put` and `_move_queen`."""
         cells, foods = self._index(change.cells), list(self.colony.task.foods)
         if change.what == "queen":
@@ -95,16 +80,16 @@ class _World:
         kind = foods.index(change.kind) if change.kind else 0
         return self._put(cells, _GROUNDS[change.what], kind)
 
-    def clear(self, change: Clear) -> Change:
+    def clear(self, change: language.Clear) -> Change:
         """Remove rock and food."""
         return self._put(self._index(change.cells), EMPTY)
 
-    def move(self, change: Move) -> Change:
+    def move(self, change: language.Move) -> Change:
         """Move the rock, the food or the queen of a cell to another; an ant there moves aside.
 
         Has no effect if the first cell has none of them, or the other one is not free.
         """
-        cell, to = (flat_index(self.colony.grid, cell) for cell in change.cells)
+        cell, to = flat_indices(self.colony.grid, change.cells)
         what, colony = int(self.view("ground")[cell]), self.colony
         if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
             yield
@@ -119,7 +104,7 @@ class _World:
             self._fill(np.array([cell]), EMPTY, 0)
             self._fill(np.array([to]), what, kind, loads)
 
-    def trail(self, change: SetTrail) -> Change:
+    def trail(self, change: language.SetTrail) -> Change:
         """Set the trail, or a further field, of cells other than rocks."""
         everywhere = np.flatnonzero(self.colony.grid.exists)
         cells = everywhere if change.cells is None else self._index(change.cells)
@@ -127,7 +112,7 @@ class _World:
         yield
         self._lay(cells[self.view("walls")[cells] == 0], change.level, number)
 
-    def add_ants(self, change: AddAnts) -> Change:
+    def add_ants(self, change: language.AddAnts) -> Change:
         """Put newborn ants on free start cells, or on those of the cells given that are empty."""
         if change.cells is None:
             return self._add_some(self._amount(change), change.heading, change.nest)
@@ -138,7 +123,7 @@ class _World:
             nests = np.full(len(cells), change.nest)
         return self._add(cells, nests, change.heading)
 
-    def remove_ants(self, change: RemoveAnts) -> Change:
+    def remove_ants(self, change: language.RemoveAnts) -> Change:
         """Remove random ants, or those on cells, with the food that they carry."""
         slots = self._living_slots(change.nest)
         cells = None if change.cells is None else self._index(change.cells)
@@ -149,7 +134,7 @@ class _World:
         else:
             self._remove(slots[np.isin(self.cells[slots], cells)])
 
-    def ants(self, change: SetAnts) -> Change:
+    def ants(self, change: language.SetAnts) -> Change:
         """Set the number of ants; new ants take free cells in the order of `World.start`."""
         n, living = change.number, self._living_slots()
         free = int(np.count_nonzero(self.view("ground") == EMPTY))
@@ -223,9 +208,10 @@ class _World:
         return self._add(_in_turn(orders, n), np.resize(wanted, n), heading)
 
     def _index(self, cells: Sequence[Any] | str) -> np.ndarray:
-        """Return the flat indices of cells, or of those of a region; AntsError if it is missing."""
-        world, grid = self.colony.worlds[self.w], self.colony.grid
-        return world.region(cells) if isinstance(cells, str) else indices(grid, cells)
+        """Return the flat indices of cells, or of those of a region, without duplicates."""
+        if isinstance(cells, str):
+            return self.colony.worlds[self.w].region(cells)
+        return np.array(list(dict.fromkeys(flat_indices(self.colony.grid, cells))), np.int64)
 
     def view(self, name: str) -> np.ndarray:
         """Return a view of the world's part of an array."""
@@ -250,7 +236,7 @@ class _World:
         slots = np.flatnonzero(living)
         return slots[np.argsort(self.view("number")[slots])]
 
-    def _amount(self, change: AddAnts | RemoveAnts) -> int:
+    def _amount(self, change: language.AddAnts | language.RemoveAnts) -> int:
         """Return a number of ants, or the number of a share of the living ones, rounded."""
         if change.share is None:
             return change.number or 0
@@ -265,10 +251,25 @@ class _World:
 
         AntsError if they would have no room for the ants, or no food to learn from.
         """
-        start, all_ = self.all.start_with(self.w, cells, contents), self.all
+        of_all, colony = self.all, self.colony
+        if not of_all.lasting:
+            yield
+            return
+        start = of_all.starts[self.w].copy()
+        start[cells] = contents
+        ants, room = max(of_all.ants, colony.ants), np.count_nonzero(start == EMPTY)
+        if ants > room:
+            raise AntsError(
+                f"{count(ants, 'ant')} start each episode, but this change would leave "
+                f"{count(int(room), 'free cell')}; leave more cells free."
+            )
+        if colony.learns and not (start & _CONTENT == FOOD).any():
+            raise AntsError(
+                "this change would remove the last food item, but ants that learn need at least 1; "
+                "leave one."
+            )
         yield
-        if all_.lasting:
-            all_.starts[self.w], all_.changed = start, True
+        of_all.starts[self.w], of_all.changed = start, True
 
     def _fill(self, cells: np.ndarray, what: int, kind: int, loads: int | None = None) -> None:
         """Make cells without ants and queens EMPTY, OBSTACLE or FOOD, by default with all loads."""
@@ -400,6 +401,7 @@ class Interventions:
     """Changes of some worlds of a colony, and of the start of their later episodes.
 
     Args:
+        colony: A `Colony`, which imports this module.
         worlds: Numbers of the worlds to change, None for all. Worlds of a colony share the numbers
             of the task, epsilon, the learning rate and the number of ants at the start, so these
             can only change in all worlds that are still running.
@@ -423,8 +425,8 @@ class Interventions:
         numbers = range(n) if worlds is None else entries_of(worlds)
         if not numbers or not all(isinstance(w, (int, np.integer)) and 0 <= w < n for w in numbers):
             raise AntsError(
-                f"worlds is {shown(worlds)}; it must be a list of numbers from 0 to {n - 1}, or "
-                "None for all worlds."
+                f"worlds is {shown(worlds)}; it must be a list of one or more numbers from 0 to "
+                f"{n - 1}, or None for all worlds."
             )
         self.worlds = tuple(dict.fromkeys(map(int, numbers)))
         self._first = colony.worlds
@@ -442,24 +444,26 @@ class Interventions:
             AntsError: A world does not allow the change; nothing has changed in any world.
         """
         colony = self.colony
-        given = isinstance(change, SetPolicy) and colony.is_given_actions  # they follow no policy
-        change.check_in(colony.worlds[self.worlds[0]], colony.task, colony.learns or given)
-        if change.in_all_worlds or (self.lasting and isinstance(change, SetAnts)):
+        learns = colony.learns
+        if isinstance(change, language.SetPolicy):  # ants that are given actions follow none either
+            learns |= colony.is_given_actions
+        change.check_in(colony.worlds[self.worlds[0]], colony.task, learns)
+        if change.in_all_worlds or (self.lasting and isinstance(change, language.SetAnts)):
             self._check_all(change)
         match change:
-            case Episode():
+            case language.Episode():
                 self.begin_episode()
-            case SetTask():
+            case language.SetTask():
                 self.set_task(change.changed(colony.task))
-            case SetEpsilon():
+            case language.SetEpsilon():
                 colony.epsilon = change.value
                 colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
-            case SetLearningRate():
+            case language.SetLearningRate():
                 colony.training = replace(
                     colony.training, learning_rate_decay=1.0, min_learning_rate=0.0
                 )
                 colony.set_learning_rate(change.value)
-            case SetPolicy():
+            case language.SetPolicy():
                 table = change.table_for(colony.task)
                 for w in self.worlds:
                     q = colony.part("q", w)
@@ -488,7 +492,7 @@ class Interventions:
             next(in_world, None)
         colony.observe(worlds)
         colony.ready[worlds] = True
-        if self.lasting and isinstance(change, SetAnts):
+        if self.lasting and isinstance(change, language.SetAnts):
             self.changed |= change.number != self.ants
             self.ants = change.number
 
@@ -554,28 +558,6 @@ class Interventions:
         worlds = [self.world(w) for w in range(len(self._first))] if self.changed else None
         colony.begin_episode(self.length, worlds)
         self.changed = False
-
-    def start_with(self, w: int, cells: Any, contents: Any) -> np.ndarray:
-        """Return the start of a world's later episodes with new contents of cells, or nothing.
-
-        AntsError if they cannot begin like this; see `_start_of`.
-        """
-        if not self.lasting:
-            return np.zeros(0, np.uint8)
-        start = self.starts[w].copy()
-        start[cells] = contents
-        ants, room = max(self.ants, self.colony.ants), np.count_nonzero(start == EMPTY)
-        if ants > room:
-            raise AntsError(
-                f"{count(ants, 'ant')} start each episode, but this change would leave "
-                f"{count(int(room), 'free cell')}; leave more cells free."
-            )
-        if self.colony.learns and not (start & _CONTENT == FOOD).any():
-            raise AntsError(
-                "this change would remove the last food item, but ants that learn need at least 1; "
-                "leave one."
-            )
-        return start
 
 
 def _start_of(world: World) -> np.ndarray:

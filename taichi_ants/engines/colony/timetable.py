@@ -11,12 +11,11 @@ from taichi_ants import measures
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.stepping import Stepper, TickingColony
 from taichi_ants.errors import AntsError
-from taichi_ants.interventions import SetPolicy
 from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
 
 
 class Timetable:
-    """The events of a protocol in the episodes of a colony.
+    """The events of a protocol in the episodes of a `Colony`, which imports this module.
 
     A context manager for an episode that has begun. At its end, the numbers and tables of the
     colony are again those of its beginning; `ColonyState.begin` resets the worlds.
@@ -37,12 +36,6 @@ class Timetable:
             for event in self._events
             if isinstance(event, When)
         }
-        if self._events:
-            self._check_colony()
-
-    def _check_colony(self) -> None:
-        """Raise an AntsError if an intervention cannot happen in this colony."""
-        colony = self._colony
         for event in self._events:
             for intervention in event.interventions:
                 everywhere = isinstance(event, When) and intervention.in_all_worlds
@@ -60,9 +53,7 @@ class Timetable:
         self._interventions = Interventions(colony, lasting=False)
         self._done: dict[int, np.ndarray] = {}  # by event: the worlds in which it has happened
         self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
-        replaces = any(
-            isinstance(x, SetPolicy) for event in self._events for x in event.interventions
-        )
+        replaces = any(event.policy for event in self._events)
         self._q = colony.arrays["q"].copy() if replaces else None
 
     def __exit__(self, *_: object) -> None:

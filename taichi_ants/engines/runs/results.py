@@ -15,9 +15,10 @@ from taichi_ants.engines.runs.engine import RunState
 from taichi_ants.errors import as_array, expect
 from taichi_ants.files import PathLike
 from taichi_ants.files.archives import Kind
+from taichi_ants.files.tables import column
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.finished import counts_of_lone_ant, of_lone_ants
-from taichi_ants.measures.tidy import Measured, Tidy, seed_array
+from taichi_ants.measures.tidy import Measured, Tidy
 from taichi_ants.records import Record
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
@@ -221,7 +222,7 @@ def _measured(
     return Measured(
         index={
             "configuration": configurations,
-            "seed": seed_array(seeds)[places],
+            "seed": column(seeds)[places],
             "episode": episodes,
             "tick": values["steps"],
         },

@@ -118,8 +118,7 @@ def test_a_discount_out_of_range_is_refused(discount: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "task",
-    [Task(evaporation_in_training=True), Task(pheromone=Pheromone(diffusion=0.1))],
+    "task", [Task(evaporation_in_training=True), Task(pheromone=Pheromone(diffusion=0.1))]
 )
 def test_trails_that_change_are_refused(task: Task) -> None:
     with pytest.raises(

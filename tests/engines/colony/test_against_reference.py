@@ -73,11 +73,11 @@ def without_rocks(world: World) -> World:
 QUICK, LONG = (0, 1, 10, 13), (2, 3, 6, 7, 8, 14)
 
 
-def marked(kernels, quick, long):
+def marked(kernels: list, quick: tuple[int, ...], long: tuple[int, ...]) -> list:
     """Kernels with marks; golden hashes show that the results of the longest stay."""
     later = [pytest.mark.long if k in long else pytest.mark.slow for k in range(len(kernels))]
     marks = [() if k in quick else mark for k, mark in enumerate(later)]
-    return [pytest.param(one, marks=mark) for one, mark in zip(kernels, marks, strict=True)]
+    return [pytest.param(kernel, marks=mark) for kernel, mark in zip(kernels, marks, strict=True)]
 
 
 @pytest.mark.parametrize("kernel", marked(KERNELS, QUICK, LONG), ids=str)
