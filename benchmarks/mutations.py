@@ -240,7 +240,7 @@ MUTATIONS = [
     ("engines/colony/timetable.py", "        done |= worlds", "        done &= worlds", PROTOCOL),
     ("engines/colony/interventions.py", "nest)) + 0.5)", "nest)))", PROTOCOL),
     ("engines/colony/interventions.py", "max(episode, 0))", "0)", PROTOCOL),
-    ("engines/colony/state.py", "        self._undo_interventions(which)\n", "", PROTOCOL),
+    ("engines/colony/state.py", "if stale.any():", "if False:", PROTOCOL),
     ("protocol.py", "range(self.interval, length", "range(0, length", PROTOCOL),
     ("protocol.py", "value > self.above", "value >= self.above", PROTOCOL),
     # Learners.

@@ -12,7 +12,7 @@ from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import checked_worlds
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.engines.colony.timetable import Timetable
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import AntsError, checked_whole, entries_of, shown
 from taichi_ants.measures.measure import Measure
 from taichi_ants.measures.series import Recorder, stops
 from taichi_ants.protocol import ProtocolEvent
@@ -81,7 +81,16 @@ class Colony(TickingColony):
         """
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
-        places = self._checked_places(worlds, episodes)
+        places: Any = [None] * episodes if worlds is None else entries_of(worlds)
+        if places is None or len(places) != episodes:
+            raise AntsError(
+                f"worlds is {shown(worlds)}; give a list with an entry for each of the {episodes} "
+                "episodes."
+            )
+        for place in places if worlds is not None else ():
+            of_seeds = checked_worlds(place, len(self.seeds), self.learns)
+            for world, seed in dict.fromkeys(zip(of_seeds, self.seeds, strict=True)):
+                world.start(seed, self.ants, self.start)  # raises an error if there is no room
         recorder, timetable = Recorder(measures, every), Timetable(self, protocol, ticks)
         outcomes = []
         for episode in range(episodes):
@@ -105,21 +114,6 @@ class Colony(TickingColony):
             if isinstance(array, np.ndarray)
         }
         return ColonyEpisodes(**counts, seeds=self.seeds, series=recorder.series())
-
-    def _checked_places(self, worlds: Any, episodes: int) -> Sequence[Any]:
-        """Return the worlds of each episode after checks; None to keep the present ones."""
-        if worlds is None:
-            return [None] * episodes
-        if not isinstance(worlds, (list, tuple)) or len(worlds) != episodes:
-            raise AntsError(
-                f"worlds is {shown(worlds)}; give a list with an entry for each of the {episodes} "
-                "episodes."
-            )
-        for place in worlds:
-            several = checked_worlds(place, len(self.seeds), self.learns)
-            for one, seed in dict.fromkeys(zip(several, self.seeds, strict=True)):
-                one.start(seed, self.ants, self.start)  # raises an error if there is no room
-        return worlds
 
     def __repr__(self) -> str:
         others = len(dict.fromkeys(self.worlds)) - 1

@@ -29,7 +29,7 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
-from taichi_ants.engines.colony.layout import ANT_STANDS, FoodRow, NestRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, NestRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.errors import AntsError, count, entries_of, shown
@@ -352,15 +352,12 @@ class _World:
             "heading": headings,
             "number": numbers,
             "nest": nests,
-            "action": -1,
-            "executed": -1,
-            "next_action": -1,
             "caste": castes,
             "stage": Stage.NEWBORN,
             "streams": stream_state(colony.seeds[self.w], STREAM_BORN, born),
         }
         for name in colony.columns():
-            self.view(name)[slots] = newborn.get(name, 0)
+            self.view(name)[slots] = newborn[name] if name in newborn else COLUMNS[name].start
         ground[cells] = OBSTACLE | (ANT_STANDS - nests) << 4
         rows[WorldRow.NEXT_NUMBER] += n
         self._count_ants()

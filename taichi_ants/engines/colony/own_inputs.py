@@ -49,10 +49,7 @@ class OwnRule:
         self.places = range(first, first + len(rule.parameters))
 
     @for_kernels
-    def choose(
-        self, c: Any, v: Any, cues: Any, w: Any, ant: Any, state: Any, paper_state: Any, tick: Any,
-        bits: Any,
-    ) -> Any:  # fmt: skip
+    def choose(self, c, v, cues, w, ant, state, paper_state, tick, bits):
         """Return an action, i32; see `steps.draw_by_cues`."""
         carries, seen = trait(c.carries, ant), state if v.is_papers else paper_state
         sight = c, v, cues, w, ant, seen, paper_state
@@ -71,10 +68,7 @@ class OwnRule:
         return self.result(c, make | _of_levels(self.inputs, *sight, carries, tick))
 
     @for_kernels
-    def lay(
-        self, c: Any, v: Any, w: Any, ant: Any, level: Any, index: Any, carried: Any, carries: Any,
-        event: Any, paper_state: Any, tick: Any,
-    ) -> Any:  # fmt: skip
+    def lay(self, c, v, w, ant, level, index, carried, carries, event, paper_state, tick):
         """Return a level, f64; see `trail.deposit`."""
         make: Make = {name: partial(_level, c, v, name, index, tick) for name in self.inputs}
         make |= {
@@ -88,14 +82,12 @@ class OwnRule:
         return self.result(c, make)
 
     @for_kernels
-    def evaporate(self, c: Any, level: Any, tick: Any) -> Any:
+    def evaporate(self, c, level, tick):
         """Return a level, f64; see `trail.evaporate`."""
         return self.result(c, {"level": lambda: level, "tick": lambda: tick})
 
     @for_kernels
-    def pay(
-        self, c: Any, v: Any, cues: Any, w: Any, ant: Any, next_paper_state: Any, tick: Any
-    ) -> Any:
+    def pay(self, c, v, cues, w, ant, next_paper_state, tick):
         """Return a reward, i32; see `steps.own_reward`."""
         carries, seen = trait(c.carries, ant), next_paper_state
         make = {

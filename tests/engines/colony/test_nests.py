@@ -12,7 +12,7 @@ from taichi_ants import AntsError, Colony, Life, Task, TrainingConfig, World
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.interventions import AddAnts, Place, RemoveAnts
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.protocol import At, When
+from taichi_ants.protocol import At
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Food
 from taichi_ants.task.constants import FOOD
@@ -130,25 +130,6 @@ def test_ants_deliver_to_their_own_queen_alone():
                 gained = colony.outcome().returns - returns
                 assert (colony.rewards.sum(axis=1, where=acted) == gained).all()
     assert happened.min() > 3
-
-
-def test_measures_of_deliveries_by_nest_kind_and_caste():
-    """In series, where they equal the counts of the result, and in a condition."""
-    task = Task(foods=KINDS, castes={"a": {"share": 0.5}, "b": {"share": 0.5}})
-    rules = {"ants": 12, "sharing": "frozen", "q_values": trail_follower()}
-    colony = Colony(WORLD, task, TRAINING, [1, 2, 3], **rules)
-    result = colony.run(1, 300, measures="deliveries_by")
-    named = {"nest": result.nest_deliveries, "food": result.food_deliveries}
-    for owner, deliveries in {**named, "caste": result.caste_deliveries}.items():
-        assert deliveries.shape == (1, 3, 2)
-        for i in range(2):
-            values = result.series.values[f"deliveries_by.{owner}_{i}"]
-            assert values.tolist() == deliveries[0, :, i].tolist()
-    assert result.deliveries.all()
-    check = When("deliveries_by.nest_0", above=0, interval=1, remove_ants=1.0)
-    ended = colony.run(1, 300, protocol=[check])
-    assert (ended.nest_deliveries[0, :, 0] <= result.nest_deliveries[0, :, 0]).all()
-    assert ((ended.living == 0) == (ended.nest_deliveries[..., 0] > 0)).all()
 
 
 def test_each_nest_learns_into_its_own_table():

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from taichi_ants import Colony, TrainingConfig, World
+from taichi_ants import AntsError, Colony, TrainingConfig, World
 from taichi_ants.engines.colony.layout import ANT_GROUND
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.reference import ReferenceColony
@@ -84,66 +84,82 @@ def after_a_tick(
     return found
 
 
-def test_under_the_papers_rules_an_ant_with_food_is_blocked_by_one_without():
-    row = [Standing(3, food=True), Standing(4, GIVE)]
-    assert after_a_tick(Traffic(), row) == [After(3, -1), After(4, -1)]
+PAIR = [Standing(3, food=True), Standing(4, GIVE)]  # the one behind carries food
+MEETING = [Standing(3, food=True), Standing(4, heading=3)]
+UNGRANTED = replace(FOLLOWING, reward_pushed=False)
 
 
-def test_an_ant_with_food_changes_places_with_one_without():
-    """It is paid for the step towards the queen; the other one pays nothing for its vain action."""
-    row = [Standing(3, food=True), Standing(4, GIVE)]
-    assert after_a_tick(RIGHT_OF_WAY, row) == [After(4, 1), After(3, 0)]
+def trails(first: int, second: int) -> dict:
+    """Levels on the cells of a pair."""
+    return {"trails": (((3, 3, 0), first), ((4, 3, 0), second))}
 
 
-def test_a_step_away_from_the_queen_pays_as_on_an_empty_cell():
-    row = [Standing(3, food=True), Standing(4, GIVE)]
-    assert after_a_tick(RIGHT_OF_WAY, row, BEHIND) == [After(4, 0), After(3, 0)]
+RULES = {
+    "the paper blocks an ant with food by one without": (Traffic(), PAIR, [(3, -1), (4, -1)], {}),
+    # It is paid for the step towards the queen; the other one pays nothing for its vain action.
+    "an ant with food changes places with one without": (RIGHT_OF_WAY, PAIR, [(4, 1), (3, 0)], {}),
+    "a step away from the queen pays as on an empty cell":
+        (RIGHT_OF_WAY, PAIR, [(4, 0), (3, 0)], {"queen": BEHIND}),
+    **{
+        f"a push pays {pay} by a homing cue without a compass, {name}": (
+            *(RIGHT_OF_WAY, PAIR, [(4, pay), (3, 0)]),
+            {"queen": queen, "homing_cue": "trail", **trails(8 + (pay == 0), 8 + pay)},
+        )
+        for name, queen in (("queen ahead", BEYOND), ("queen behind", BEHIND))
+        for pay in (0, 1)
+    },
+    "a pushed ant is paid as for an empty cell": (
+        *(RIGHT_OF_WAY, [PAIR[0], Standing(4, PICK_UP)], [(4, 2), (3, 7)]),
+        {"rewards": Rewards(empty=7, failed=-5, shaping=2)},
+    ),
+    # It turned to the ant before it, and was blocked; the helper compares the headings.
+    "a pushed ant keeps the turn of its move": (
+        *(RIGHT_OF_WAY, [PAIR[0], Standing(4, RIGHT, heading=5), Standing(5, GIVE)]),
+        *([(4, 1), (3, 0), (5, -1)], {}),
+    ),
+    "ants with food are never pushed":
+        (RIGHT_OF_WAY, [PAIR[0], Standing(4, PICK_UP, food=True)], [(3, -1), (4, -1)], {}),
+    "ants without food push nobody": (RIGHT_OF_WAY, [Standing(3), PAIR[1]], [(3, -1), (4, -1)], {}),
+    **{
+        f"an ant that takes food is not pushed, {name}": (
+            *(traffic, [PAIR[0], Standing(4, PICK_UP)], [(3, -1), (4, 3)]),
+            {"foods": ((5, 3, 0),)},
+        )
+        for name, traffic in (("right of way", RIGHT_OF_WAY), ("following", FOLLOWING))
+    },
+    # Behind it the ant with food is blocked, unless it can follow.
+    "an ant that moves itself is not pushed":
+        (RIGHT_OF_WAY, [PAIR[0], Standing(4)], [(3, -1), (5, 0)], {}),
+    "an ant that moves itself is followed":
+        (FOLLOWING, [PAIR[0], Standing(4)], [(4, 1), (5, 0)], {}),
+    "a queue moves as one":
+        (QUEUES_ONLY, [Standing(x) for x in (2, 3, 4)], [(3, 0), (4, 0), (5, 0)], {}),
+    "a queue of the strictest rules moves as one":
+        (FOLLOWING, [Standing(x) for x in (2, 3, 4)], [(3, 0), (4, 0), (5, 0)], {}),
+    "a queue before a waiting ant stays": (
+        *(QUEUES_ONLY, [Standing(2), Standing(3), Standing(4, GIVE)]),
+        *([(2, -1), (3, -1), (4, -1)], {}),
+    ),
+    "a pair that meets stays where ants only follow":
+        (QUEUES_ONLY, [Standing(3), Standing(4, heading=3)], [(3, -1), (4, -1)], {}),
+    "nobody follows into the cell of an ant that changes places":
+        (FOLLOWING, [Standing(2), *PAIR], [(2, -1), (4, 1), (3, 0)], {}),
+    # They meet; the ant without food wanted to go where the trail is stronger.
+    **{
+        f"an ant pushed where it wanted to go is paid {pay}, {name}":
+            (traffic, MEETING, [(4, 1), (3, pay)], trails(25, 20))
+        for name, traffic, pay in (
+            *(("right of way", RIGHT_OF_WAY, 0), ("not granted", UNGRANTED, 0)),
+            ("granted", FOLLOWING, 1),
+        )
+    },
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("queen", [BEYOND, BEHIND])
-@pytest.mark.parametrize(("stronger", "pay"), [(4, 1), (3, 0)])
-def test_without_a_compass_a_push_pays_by_the_homing_cue(queen, stronger, pay):
-    row = [Standing(3, food=True), Standing(4, GIVE)]
-    trails = (((stronger, 3, 0), 9), ((7 - stronger, 3, 0), 8))
-    found = after_a_tick(RIGHT_OF_WAY, row, queen, trails=trails, homing_cue="trail")
-    assert found == [After(4, pay), After(3, 0)]
-
-
-def test_a_pushed_ant_is_paid_as_for_an_empty_cell():
-    row = [Standing(3, food=True), Standing(4, PICK_UP)]
-    paid = Rewards(empty=7, failed=-5, shaping=2)
-    assert after_a_tick(RIGHT_OF_WAY, row, rewards=paid) == [After(4, 2), After(3, 7)]
-
-
-def test_a_pushed_ant_keeps_the_turn_of_its_move():
-    """It turned to the ant before it, and was blocked; the helper compares the headings."""
-    row = [Standing(3, food=True), Standing(4, RIGHT, heading=5), Standing(5, GIVE)]
-    assert after_a_tick(RIGHT_OF_WAY, row) == [After(4, 1), After(3, 0), After(5, -1)]
-
-
-def test_ants_with_food_are_never_pushed():
-    row = [Standing(3, food=True), Standing(4, PICK_UP, food=True)]
-    assert after_a_tick(RIGHT_OF_WAY, row) == [After(3, -1), After(4, -1)]
-
-
-def test_ants_without_food_push_nobody():
-    row = [Standing(3), Standing(4, GIVE)]
-    assert after_a_tick(RIGHT_OF_WAY, row) == [After(3, -1), After(4, -1)]
-
-
-@pytest.mark.parametrize("traffic", [RIGHT_OF_WAY, FOLLOWING])
-def test_an_ant_that_takes_food_is_not_pushed(traffic):
-    row = [Standing(3, food=True), Standing(4, PICK_UP)]
-    assert after_a_tick(traffic, row, foods=((5, 3, 0),)) == [After(3, -1), After(4, 3)]
-
-
-@pytest.mark.parametrize(
-    ("traffic", "then"), [(RIGHT_OF_WAY, After(3, -1)), (FOLLOWING, After(4, 1))]
-)
-def test_an_ant_that_moves_itself_is_not_pushed(traffic, then):
-    """Behind it the ant with food is blocked, unless it can follow."""
-    row = [Standing(3, food=True), Standing(4)]
-    assert after_a_tick(traffic, row) == [then, After(5, 0)]
+@pytest.mark.parametrize("rule", RULES)
+def test_a_row_of_ants_after_a_tick(rule):
+    traffic, row, after, options = RULES[rule]
+    assert after_a_tick(traffic, row, **options) == [After(*one) for one in after]
 
 
 def test_an_ant_without_food_can_win_the_cell_from_one_with_food_and_nobody_enters():
@@ -164,38 +180,6 @@ def test_where_carriers_come_first_an_ant_with_food_wins_the_cell():
         assert [one.x for one in after] == [x, x - 1, x + 1]
 
 
-@pytest.mark.parametrize("traffic", [QUEUES_ONLY, FOLLOWING])
-def test_a_queue_moves_as_one(traffic):
-    row = [Standing(x) for x in (2, 3, 4)]
-    assert [one.x for one in after_a_tick(traffic, row)] == [3, 4, 5]
-
-
-def test_a_queue_before_a_rock_or_a_waiting_ant_stays():
-    row = [Standing(2), Standing(3), Standing(4, GIVE)]
-    assert after_a_tick(QUEUES_ONLY, row) == [After(2, -1), After(3, -1), After(4, -1)]
-
-
-def test_a_pair_that_meets_stays_where_ants_only_follow():
-    row = [Standing(3), Standing(4, heading=3)]
-    assert after_a_tick(QUEUES_ONLY, row) == [After(3, -1), After(4, -1)]
-
-
-def test_nobody_follows_into_the_cell_of_an_ant_that_changes_places():
-    row = [Standing(2), Standing(3, food=True), Standing(4, GIVE)]
-    assert [one.x for one in after_a_tick(FOLLOWING, row)] == [2, 4, 3]
-
-
-@pytest.mark.parametrize(
-    ("traffic", "paid"),
-    [(RIGHT_OF_WAY, 0), (replace(FOLLOWING, reward_pushed=False), 0), (FOLLOWING, 1)],
-)
-def test_an_ant_that_is_pushed_where_it_wanted_to_go_is_paid_for_the_move_if_granted(traffic, paid):
-    """They meet; the ant without food wanted to go where the trail is stronger."""
-    row = [Standing(3, food=True), Standing(4, heading=3)]
-    trails = (((3, 3, 0), 25), ((4, 3, 0), 20))
-    assert after_a_tick(traffic, row, trails=trails) == [After(4, 1), After(3, paid)]
-
-
 @pytest.mark.parametrize("traffic", [QUEUES_ONLY, replace(FOLLOWING, reward_pushed=False)])
 def test_a_ring_of_three_ants_stays(traffic):
     """Three cells that touch each other; each ant wants the cell of the next one."""
@@ -214,8 +198,6 @@ def test_a_ring_of_three_ants_stays(traffic):
 
 
 def test_options_that_change_nothing_are_refused():
-    from taichi_ants import AntsError
-
     for options, message in (
         ({"reward_pushed": True}, "leave it out unless `swap` is True"),
         ({"carriers_first": True}, "carriers_first` is True; leave it out"),
