@@ -93,7 +93,7 @@ def begin(
     first: dict[int, tuple[Example, Episode]] = {}
     for example, episode in zip(examples, played, strict=True):
         first.setdefault(int(comparison.behaviours[example.row, example.run]), (example, episode))
-    done, captions = counts(comparison.behaviours), dict[Any, Any]()
+    done, captions = counts(comparison.behaviours), dict[Any, tuple[str, str]]()
     for code, (example, episode) in sorted(first.items()):
         _, variant, grid = comparison.rows[example.row]
         whose = (
@@ -106,15 +106,15 @@ def begin(
         calls[code] = process.begin(record_trace, episode.trace, BEHAVIOURS[code])
         if code == DELIVERS:
             title, task = f"{variant.label}: policy", example.point.task
-            captions["sheet"] = (f"The policy of an ant: {whose}",)
+            captions["sheet"] = "", f"The policy of an ant: {whose}"
             calls["sheet"] = process.begin(policy_sheet, example.q_values, title, task=task)
     calls["drawings"] = draw(figures.for_page, comparison, baselines)
 
     def wait() -> Seen:
         with progress_bar("pictures") as progress:
             results = process.results_of(calls, progress)
-        players = [Player(*captions[code], recording=results[code]) for code in sorted(first)]
-        sheet = Picture(*captions["sheet"], image=results["sheet"]) if "sheet" in results else None
+        players = [Player(*captions[code], results[code]) for code in sorted(first)]
+        sheet = Picture(captions["sheet"][1], results["sheet"]) if "sheet" in results else None
         return Seen(results["drawings"], players, sheet)
 
     return wait
