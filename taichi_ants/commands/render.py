@@ -137,15 +137,12 @@ def is_page(settings: argparse.Namespace) -> bool:
 
 def run(settings: argparse.Namespace) -> None:
     """Write the file that the settings describe, and print a summary."""
-    from taichi_ants.rendering import check_animation, check_picture
+    from taichi_ants.rendering import check_animation
     from taichi_ants.rendering.scene import check_size
-    from taichi_ants.rendering.writers import is_picture
     from taichi_ants.viewer import check_page
 
     if is_page(settings):
         check_page(settings.out)
-    elif is_picture(settings.out):
-        check_picture(settings.out)
     else:
         check_animation(settings.out, settings.fps)
     check_size(settings.size)
@@ -237,16 +234,14 @@ def _save_snapshots(
     title: str,
     task: Task,
 ) -> None:
-    from taichi_ants.rendering import frames, save_picture
+    from taichi_ants.rendering import frames
     from taichi_ants.rendering.writers import is_picture
 
     look: dict[str, Any] = {"size": settings.size, "title": title, "overlay": settings.overlay}
     look["task"] = task
     if is_picture(settings.out):
-        last = deque(snapshots, maxlen=1)
-        save_picture(settings.out, next(frames(last, **look)))
-    else:
-        save_frames(settings, frames(snapshots, **look), n)
+        snapshots = deque(snapshots, maxlen=1)
+    save_frames(settings, frames(snapshots, **look), n)
 
 
 def save_frames(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n: int) -> None:

@@ -176,16 +176,14 @@ class Choices:
         settings = flat(setup.task.as_dict(), "task")
         settings |= {f"world.{n}": v for n, v in setup.world_settings.items() if n != "ranges"}
         if isinstance(table, TrainingConfig):
-            policy, numbers = (
-                LEARNS + table.learner,
-                {**asdict(table), **dict(table.hyperparameters)},
-            )
+            policy = LEARNS + table.learner
+            numbers = {**asdict(table), **dict(table.hyperparameters)}
             settings |= {f"training.{n}": v for n, v in numbers.items() if type(v) in (int, float)}
         else:
-            same = (
-                n for n, policy in self.policies.items() if np.array_equal(policy.q_values, table)
-            )
-            policy = next((FOLLOWS + name for name in same), BY_HAND)
+            policy = BY_HAND
+            for name, offered in self.policies.items():
+                if np.array_equal(offered.q_values, table):
+                    policy = FOLLOWS + name
         return {
             "world": "map" if is_map else setup.world,
             "map": setup.world if is_map else "",

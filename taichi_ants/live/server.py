@@ -24,7 +24,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
-from importlib import resources
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -32,7 +31,7 @@ from taichi_ants.errors import AntsError, imported
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.exports import LOAD, QUICK, SLOW, Export, Replay
 from taichi_ants.live.session import Log, Session
-from taichi_ants.viewer.page import assemble
+from taichi_ants.viewer.page import assemble, part
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -77,8 +76,7 @@ _HEADERS = {
 @cache
 def live_page(server: str) -> str:
     """Return the HTML of the viewer with controls; it connects only to `server`."""
-    folder = resources.files(__package__)
-    controls, style, *scripts = (folder.joinpath(name).read_text("utf-8") for name in PARTS)
+    controls, style, *scripts = (part(name, "taichi_ants.live") for name in PARTS)
     parts = {"controls": controls, "style": style, "script": "\n".join(scripts)}
     return assemble("Taichi Ants, live", **parts, connect=server)
 

@@ -124,14 +124,14 @@ class Session:
         # The title must not contain the number of ants, because interventions change it.
         title = f"Ants in a world of {self.colony.grid.count} cells"
         self._recorder = Recorder(self.colony, title=title, pheromone=setup.pheromone)
-        self._recorder.progress.note()
+        self._recorder.note()
         self._recorder.snapshot()
         self._named = set(self._recorder.names())
 
     @property
     def ticks(self) -> int:
         """The number of ticks in all episodes."""
-        return self._recorder.progress.ticks
+        return self._recorder.ticks
 
     @property
     def steps(self) -> int:
@@ -178,9 +178,8 @@ class Session:
 
     def _run(self, n: int, tick: Callable[[int], Any]) -> Any:
         """Advance with the function `tick`; return its result, None if no tick passes."""
-        progress = self._recorder.progress
         if self.ended:
-            progress.note(ended=True)
+            self._recorder.note(ended=True)
             self._begun += 1  # first, because Ctrl-C during a launch raises an error after it
             self.interventions.begin_episode()
             return None
@@ -192,7 +191,7 @@ class Session:
             frame = tick(n)
         finally:  # also after an interrupt
             self._spent += time.perf_counter() - began
-        progress.note()
+        self._recorder.note()
         return frame
 
     def apply(self, edit: object, goes_on: bool = False) -> bytes:
@@ -215,7 +214,7 @@ class Session:
             self._take_snapshot()
         began = time.perf_counter()
         if "episode" in plain:
-            self._recorder.progress.note(ended=True)
+            self._recorder.note(ended=True)
         # Recorded first, because Ctrl-C during a launch raises an error after it.
         if begins:
             self.changes.append(len(self.edits))

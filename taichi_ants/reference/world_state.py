@@ -45,27 +45,20 @@ class Trail:
         rules: Mapping[str, Parameters] = MappingProxyType({}),
     ) -> None:
         self.rule, self._rules = pheromone, rules
-        self._index = {cell: index for index, cell in enumerate(cells)}
-        kind = np.float32 if pheromone.dense else np.int64
-        self._levels: np.ndarray = np.array([levels.get(cell, 0) for cell in cells], kind)
-        if pheromone.diffusion > 0:
-            # Rocks and the outside are walls, which all have the index behind the last cell.
-            wall = len(cells)
-            around = [
-                [self._index.get(neighbour(cell, heading), wall) for heading in range(N_HEADINGS)]
-                for cell in cells
-            ]
-            self._around = np.array(around)
-            self._n_open = np.count_nonzero(self._around != wall, axis=1).astype(np.float32)
+        self._kind: type = np.float32 if pheromone.dense else int
+        self._levels: dict[Cell, Any] = {cell: self._kind(levels.get(cell, 0)) for cell in cells}
+        self._around = {}  # without walls: rocks and the outside
+        for cell in cells if pheromone.diffusion > 0 else ():
+            around = [neighbour(cell, heading) for heading in range(N_HEADINGS)]
+            self._around[cell] = [there for there in around if there in self._levels]
 
     def level(self, cell: Cell) -> Level:
         """Return the level of a cell, 0 for a rock."""
-        index = self._index.get(cell)
-        return 0 if index is None else self._levels[index]
+        return self._levels.get(cell, 0)
 
-    def lay(self, cell: Cell, level: Level) -> None:
+    def lay(self, cell: Cell, level: Level | float) -> None:
         """Set the level of a cell other than a rock."""
-        self._levels[self._index[cell]] = level
+        self._levels[cell] = self._kind(level)
 
     def deposit(
         self, cell: Cell, ant: Ant, tick: int, others: Mapping[str, Trail], stimulus: float
@@ -75,54 +68,48 @@ class Trail:
         The ant has the load and the event after its action, and the paper's state before it.
         `others` are all pheromones by name, `stimulus` is that of the ant's nest.
         """
-        index, rule, carried = self._index[cell], self.rule, ant.carried
+        rule, level = self.rule, self._levels[cell]
         if rule.own_deposit is not None:
-            facts: dict[str, Any] = {name: trail.level(cell) for name, trail in others.items()}
-            facts = {f"level_{name}": level for name, level in facts.items()}
+            facts: dict[str, Any] = {
+                f"level_{name}": trail.level(cell) for name, trail in others.items()
+            }
             for name in ("carried", "carries", "event", "paper_state", "trait", "threshold"):
                 facts[name] = getattr(ant, name)
-            facts |= {"tick": tick, "stimulus": stimulus}
-            level = self._computed(rule.own_deposit, index, facts)
-            self._levels[index] = level if rule.dense else math.floor(level)
+            facts |= {"level": level, "tick": tick, "stimulus": stimulus}
+            level = self._computed(rule.own_deposit, facts)
+            level = level if rule.dense else math.floor(level)
         elif rule.deposit == "set":
-            self._levels[index] = rule.level
+            level = rule.level
         elif rule.deposit == "add":
-            self._levels[index] = min(self._levels[index] + rule.level, rule.cap)
+            level = min(level + rule.level, rule.cap)
         elif rule.deposit == "fading":
-            self._levels[index] = max(
-                self._levels[index], rule.level - int(rule.slope or 0) * carried
-            )
+            level = max(level, rule.level - int(rule.slope or 0) * ant.carried)
+        self.lay(cell, level)
 
-    def _computed(self, rule: Rule, index: int, facts: Mapping[str, float]) -> float:
+    def _computed(self, rule: Rule, facts: Mapping[str, Any]) -> float:
         """Return the result of your own rule for a cell."""
-        inputs = {**facts, "level": self._levels[index]}
-        inputs = {name: float(inputs[name]) for name in rule.inputs}
+        inputs = {name: float(facts[name]) for name in rule.inputs}
         return rule.result(inputs, vars(self._rules[rule.name]))
 
     def tick(self, tick: int = 0) -> None:
         """Let trails evaporate, then spread, for one tick."""
-        evaporation = self.rule.own_evaporation
-        if evaporation is not None:
-            indices = range(len(self._levels))
-            levels = [self._computed(evaporation, index, {"tick": tick}) for index in indices]
-            self._levels = np.array(levels, np.float32)
-        elif self.rule.evaporation == "linear":
-            self._levels = np.maximum(self._levels - 1, 0)
-        elif self.rule.evaporation == "exponential":
-            self._levels = self._levels * self.rule.decay
-            self._levels[self._levels < 1] = 0
-        if self.rule.diffusion > 0:
-            self._diffuse()
-
-    def _diffuse(self) -> None:
-        shares = self._levels * self.rule.share
-        outflow = shares * self._n_open  # nothing diffuses into walls
-        shares_and_wall = np.append(shares, np.float32(0))
-        inflow = np.zeros_like(shares)
-        for heading in range(N_HEADINGS):
-            inflow = inflow + shares_and_wall[self._around[:, heading]]
-        # With diffusion 1 a cell loses its whole level, and rounding could leave less than 0.
-        self._levels = np.maximum((self._levels - outflow) + inflow, 0)
+        rule, evaporation = self.rule, self.rule.own_evaporation
+        for cell, level in self._levels.items():
+            if evaporation is not None:
+                level = self._computed(evaporation, {"level": level, "tick": tick})
+            elif rule.evaporation == "linear":
+                level = max(level - 1, 0)
+            elif rule.evaporation == "exponential":
+                level = level * rule.decay
+                level = level if level >= 1 else 0
+            self.lay(cell, level)
+        shares = {cell: self._levels[cell] * rule.share for cell in self._around}
+        for cell, around in self._around.items():
+            outflow, inflow = shares[cell] * np.float32(len(around)), np.float32(0)
+            for there in around:
+                inflow = inflow + shares[there]
+            # With diffusion 1 a cell loses its whole level, and rounding could leave less than 0.
+            self.lay(cell, max((self._levels[cell] - outflow) + inflow, 0))
 
 
 class WorldState:

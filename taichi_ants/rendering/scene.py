@@ -256,11 +256,11 @@ def _draw_status(
     if status.q_values is not None:
         y += round(0.3 * size)
         text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
-        _draw_bars(frame, status, left, y + round(0.5 * size), width, size)
+        _draw_bars(frame, status, y + round(0.5 * size), left, width, size)
 
 
 def _draw_bars(
-    frame: np.ndarray, status: Status, left: int, top: int, width: int, size: int
+    frame: np.ndarray, status: Status, top: int, left: int, width: int, size: int
 ) -> None:
     start = left + max(text.width(name, size) for name in ACTION_NAMES) + 0.6 * size
     end = left + width - text.width("-00.00", size) - 0.3 * size

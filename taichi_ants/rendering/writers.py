@@ -41,7 +41,7 @@ def check_animation(path: files.PathLike, fps: Fps = 8.0) -> Path:
     """Return the path of an animation after checking that it can be written.
 
     Args:
-        path: A .gif or .mp4 file.
+        path: A .gif or .mp4 file, or a .png file for the last frame.
         fps: Frames per second, 0.1 to 50.
 
     Raises:
@@ -104,8 +104,7 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     Raises:
         AntsError: The file does not end in .png, or is not writable.
     """
-    target = check_picture(path)
-    write(target, png(next(_checked([frame])), optimize=True))
+    save_animation(check_picture(path), [frame])
 
 
 def write(target: Path, content: bytes) -> None:
@@ -205,5 +204,11 @@ def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: f
         container.mux(stream.encode())
 
 
+def _png(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
+    """Write the last frame."""
+    *_, last = frames
+    file.write(png(last, optimize=True))
+
+
 # Functions that write frames into a file, by its ending.
-_ENCODERS = {".gif": _gif, ".mp4": _mp4}
+_ENCODERS = {".png": _png, ".gif": _gif, ".mp4": _mp4}

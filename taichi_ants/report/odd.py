@@ -242,8 +242,8 @@ def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
         "parameters": _table(heads, [row for row in rows if not _EVENT.match(row[0])]),
         "sources": _table(("File", "SHA-256 begins"), sources),
     }
-    template = resources.files(__package__).joinpath("odd.md").read_text(encoding="utf-8")
-    return re.sub("\n{3,}", "\n\n", template.format(**parts)).rstrip() + "\n"
+    text = resources.files(__package__).joinpath("odd.md").read_text("utf-8").format(**parts)
+    return re.sub("\n{3,}", "\n\n", text).rstrip() + "\n"
 
 
 def _table(heads: Row, rows: Iterable[Row]) -> str:

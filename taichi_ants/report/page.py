@@ -7,12 +7,10 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
-from functools import cache
 from html import escape
-from importlib import resources
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,9 +20,7 @@ from taichi_ants.errors import count
 from taichi_ants.viewer.frames import Recording
 from taichi_ants.viewer.page import content_policy, part
 
-if TYPE_CHECKING:
-    from jinja2 import Environment
-
+_HERE = "taichi_ants.report"
 # Scripts of the viewer: the data of a recording, the picture of the world, and the playback.
 _PLAYING = ("history.js", "stage.js", "timeline.js")
 
@@ -35,19 +31,6 @@ _SHOWN_PACKAGES = ("taichi_ants", "taichi", "numpy", "scipy", "matplotlib")
 _LETTERS = 58  # characters of a line as wide as the drawing
 
 
-def text_of(name: str) -> str:
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-
-
-@cache
-def _templates() -> Environment:
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
-
-    how: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
-    loader = FunctionLoader(text_of)
-    return Environment(loader=loader, finalize=signed, undefined=StrictUndefined, **how)
-
-
 def signed(text: Any) -> Any:
     """Return text with true minus signs before numbers, and other values unchanged."""
     plain = isinstance(text, str) and not hasattr(text, "__html__")
@@ -56,15 +39,19 @@ def signed(text: Any) -> Any:
 
 def fill(template: Path, **parts: Any) -> str:
     """Return a page as HTML from a file that extends base.html; text in `parts` is escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    shared = {
-        "style": part("colours.css") + text_of("report.css"),
-        "script": "\n".join([*map(part, _PLAYING), text_of("report.js")]),
-    }
-    shared["policy"] = content_policy(f"\n{shared['script']}\n", f"\n{shared['style']}\n")
+    how: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    how |= {"finalize": signed, "undefined": StrictUndefined}
+    style = part("colours.css") + part("report.css", _HERE)
+    script = "\n".join([*map(part, _PLAYING), part("report.js", _HERE)])
+    shared = {"style": style, "script": script}
+    shared["policy"] = content_policy(f"\n{script}\n", f"\n{style}\n")
     marked = {name: Markup(text) for name, text in shared.items()}
-    page = _templates().from_string(template.read_text(encoding="utf-8"))
+    page = Environment(loader=PackageLoader("taichi_ants", "report"), **how).from_string(
+        template.read_text(encoding="utf-8")
+    )
     return page.render(**marked, **parts)
 
 

@@ -84,11 +84,9 @@ def draw(rows: Sequence[Span], title: str) -> Figure:
 
 def check_places(save: str | None, render: str | None, figure: str | None = None) -> None:
     """Check, before the work begins, that the files of `live` can be written."""
-    from taichi_ants.rendering.writers import check_animation, check_picture, is_picture
+    from taichi_ants.rendering import check_animation, check_picture
 
-    if render is not None and is_picture(render):
-        check_picture(render)
-    elif render is not None:
+    if render is not None:
         check_animation(render, FRAMES_PER_SECOND)
     if figure is not None:
         files.check_writable_file(Path(check_picture(figure)).with_suffix(".csv"))

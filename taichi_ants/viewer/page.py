@@ -29,9 +29,9 @@ _MOST_CELLS, _MOST_ANTS, _MOST_STEPS = 200_000, 20_000, 10_000
 
 
 @cache
-def part(name: str) -> str:
-    """Return the text of a part of the page, which is a file in this folder."""
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+def part(name: str, package: str = "taichi_ants.viewer") -> str:
+    """Return the text of a part of a page, which is a file in a package."""
+    return resources.files(package).joinpath(name).read_text(encoding="utf-8")
 
 
 def page(recording: Recording) -> str:

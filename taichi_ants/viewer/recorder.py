@@ -30,48 +30,6 @@ _MOST = 2000  # points of curves
 Point = tuple[float, ...]  # see `frames.POINT`
 
 
-class Progress:
-    """Points of the curves of one world: at the ends of episodes, and within the first episode."""
-
-    def __init__(self, colony: Colony, world: int) -> None:
-        self._colony, self._world, self._first = colony, world, colony.episode
-        # The ticks of all episodes until the last end that was noted, and the number of that one.
-        self._before, self._ended = 0, -1
-        self._every, self._seen = 1, 0  # one of `_every` points is kept
-        self.points: list[Point] = []
-        self._new: list[Point] = []
-
-    @property
-    def ticks(self) -> int:
-        """The number of ticks in all episodes."""
-        present = self._colony.ticks * (self._colony.episode != self._ended)
-        return self._before + present
-
-    def note(self, ended: bool = False) -> None:
-        """Add a point for the present; call it with `ended` before another episode begins."""
-        colony = self._colony
-        if not ended and colony.episode != self._first:
-            return
-        outcome, ticks = colony.outcome(), self.ticks
-        if self._seen % self._every == 0:
-            delivered = colony.delivered[self._world] + outcome.deliveries[0, self._world]
-            returns = outcome.returns[0, self._world]
-            numbers = (colony.episode, ticks, delivered, returns, colony.epsilon, ended)
-            self.points.append(tuple(map(float, numbers)))
-            self._new.append(self.points[-1])
-        self._seen += 1
-        if len(self.points) > _MOST:
-            del self.points[1::2]
-            self._every *= 2
-        if ended:
-            self._before, self._ended = ticks, colony.episode
-
-    def take_new_points(self) -> list[Point]:
-        """Return the points that were added since the last call."""
-        new, self._new = self._new, []
-        return new
-
-
 class Recorder:
     """Makes frames of one world of a colony: `snapshot` of the present, `tick` over time.
 
@@ -104,7 +62,11 @@ class Recorder:
         self.types = types_of(self.grid.size, self._n_states, self._rule.dense)
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables that were sent
         self._owners = np.full(owners, -1) if colony.one_a_slot else np.arange(owners)
-        self.progress = Progress(colony, world)
+        # For curves: the first episode, the ticks until the last end that was noted, its episode.
+        self._first, self._before, self._ended = colony.episode, 0, -1
+        self._every, self._seen = 1, 0  # one of `_every` points is kept
+        self._points: list[Point] = []
+        self._new: list[Point] = []
         self._forget()
 
     def _forget(self) -> None:
@@ -113,6 +75,33 @@ class Recorder:
         self._ground, self._kinds = (np.zeros(self.grid.size, np.uint8) for _ in range(2))
         self._trail = np.zeros(self.grid.size)  # levels of the pheromone, as they are stored
         self._table = np.full((len(self._known), N_ACTIONS), np.nan, np.float32)
+
+    @property
+    def ticks(self) -> int:
+        """The number of ticks in all episodes."""
+        return self._before + self.colony.ticks * (self.colony.episode != self._ended)
+
+    def note(self, ended: bool = False) -> None:
+        """Add a point of the curves: at the end of an episode, or within the first one.
+
+        Call it with `ended` before another episode begins.
+        """
+        colony = self.colony
+        if not ended and colony.episode != self._first:
+            return
+        outcome, ticks = colony.outcome(), self.ticks
+        if self._seen % self._every == 0:
+            delivered = colony.delivered[self.world] + outcome.deliveries[0, self.world]
+            returns = outcome.returns[0, self.world]
+            numbers = (colony.episode, ticks, delivered, returns, colony.epsilon, ended)
+            self._points.append(tuple(map(float, numbers)))
+            self._new.append(self._points[-1])
+        self._seen += 1
+        if len(self._points) > _MOST:
+            del self._points[1::2]
+            self._every *= 2
+        if ended:
+            self._before, self._ended = ticks, colony.episode
 
     @property
     def _rule(self) -> Pheromone:
@@ -210,7 +199,8 @@ class Recorder:
         late = copy.copy(self)
         late._forget()
         late._known, late._owners = self._known.copy(), self._owners.copy()
-        return late._frame({"progress": self.progress.points})
+        late._new = self._points
+        return late._frame({})
 
     def tick(self, n: int = 1, td_errors: np.ndarray | None = None) -> bytes:
         """Return a frame after n more ticks; it has the actions of ants only if n is 1.
@@ -296,10 +286,10 @@ class Recorder:
         totals = (outcome.deliveries[0, self.world], outcome.returns[0, self.world])
         rates = (colony.epsilon, colony.learning_rate)
         delivered = colony.delivered[self.world] + totals[0]
-        counts = (len(numbers), delivered, self.progress.ticks)
+        counts = (len(numbers), delivered, self.ticks)
         stored, clock = colony.stored_trail(self.world, self.pheromone)
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, clock)
-        sections.setdefault("progress", self.progress.take_new_points())
+        sections["progress"], self._new = self._new, []
         layers = {"ground": snapshot.ground, "kinds": snapshot.food_kinds, "trail": stored}
         for name, layer in layers.items():
             cells = np.flatnonzero(getattr(self, f"_{name}") != layer)
@@ -381,7 +371,7 @@ def record_trace(trace: Trace, title: str = "") -> Recording:
     errors = np.zeros(len(trace)) if trace.td_errors is None else trace.td_errors
     for number, (step, error) in enumerate(zip(trace.steps.tolist(), errors, strict=True)):
         if step == 0 and number:
-            recorder.progress.note(ended=True)
+            recorder.note(ended=True)
             colony.end_episode()
             colony.begin_episode(arguments.max_steps)
         if step == 0:

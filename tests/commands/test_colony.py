@@ -60,7 +60,7 @@ def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are
         (["live", "--render", "../a.png/", "--resume", "x"], "'../a.png/' is not a regular file"),
         (
             ["live", "--render", ".", "--resume", "x"],
-            "'.' already exists and is not an empty folder",
+            "is not a regular file",
         ),
         (
             [

@@ -236,7 +236,7 @@ def test_learning_and_a_sheet_from_the_command_line(tmp_path: Path, capsys) -> N
 @pytest.mark.parametrize(
     ("name", "arguments", "said"),
     [
-        ("learning", ["--out", "{}/a.png"], ".gif"),
+        ("learning", ["--out", "{}/a.avi"], ".gif"),
         ("learning", ["--policy", "a.npz"], "--policy"),
         ("learning", ["--checkpoints", "5", "2"], "it must be ascending numbers"),
         ("policy_sheet", ["--out", "{}/a.gif"], ".png"),

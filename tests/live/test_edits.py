@@ -3,7 +3,6 @@ changes nothing."""
 
 from __future__ import annotations
 
-import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -14,11 +13,9 @@ from random_edits import apply_to_both, random_edit
 from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, TrainingConfig, worlds
-from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.layout import NestRow, Stage, WorldRow
 from taichi_ants.interventions import Place
-from taichi_ants.live import edits
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.interventions import Interventions as PlainInterventions
 from taichi_ants.task import foraging
@@ -107,41 +104,6 @@ def test_edits_keep_colony_and_reference_equal(kernel):
     assert done.keys() >= {"place", "clear", "trail", "add_ants", "remove_ants", "episode"}
     assert min(done.values()) > 1, done
     assert refused > 5
-
-
-def test_schedules_do_not_matter_to_edits(monkeypatch):
-    """Many chunks; where no slot is vacant, ants are sorted now and then."""
-    monkeypatch.setattr(layout, "_CHUNKS_PER_THREAD", 8)
-    for name in ("_FEWEST_TICKS", "_MOST_TICKS"):  # between two sorts
-        monkeypatch.setattr(stepping, name, 2)
-    world, training = worlds.open_world(5, (9, 8, 7)), TRAINING
-    both = []
-    for schedule in ("by_world", "by_chunk"):
-        options = {"ants": 40, "capacity": 40, "schedule": schedule}
-        colony = Colony(world, foraging(), training, 3, **options)
-        colony.begin_episode()
-        both.append(Interventions(colony))
-    rng, full = np.random.default_rng(1), 0
-    for _ in range(60):
-        edit = random_edit(rng, both[0])
-        for interventions in both:
-            with contextlib.suppress(AntsError):
-                interventions.apply(edits.checked(edit, interventions))
-            interventions.colony.tick(3)
-            assert_sound(interventions)
-        one, other = (interventions.colony for interventions in both)
-        full += int(one.living.all())
-        assert np.array_equal(one.q_values, other.q_values)
-        for name in ("ground", "trail", "first_streams", "worlds"):
-            known = slice(None) if name != "worlds" else [WorldRow.LIVING, WorldRow.NEXT_NUMBER]
-            assert np.array_equal(one.arrays[name][known], other.arrays[name][known]), name
-        for name in set(one.columns()) - {"want", "event"}:
-            by_number = [
-                colony.arrays[name][colony.living[0]][np.argsort(colony.numbers[colony.living])]
-                for colony in (one, other)
-            ]
-            assert np.array_equal(*by_number), name
-    assert 0 < full < 60
 
 
 @pytest.mark.parametrize(("what", "content"), [("rock", OBSTACLE), ("food", FOOD)])

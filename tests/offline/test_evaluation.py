@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import plain_offline as plain
 import pytest
 from plain_data import behaviour_of, episodes_of, random_data
 from random_worlds import random_world
@@ -13,7 +14,6 @@ from taichi_ants import AntsError, Task, record, worlds
 from taichi_ants.learners.policies import action_probabilities
 from taichi_ants.offline.evaluation import importance_sampling, model_based
 from taichi_ants.offline.learners import tolerance
-from taichi_ants.reference import offline as plain
 
 STILL = Task(evaporation_in_evaluation=False)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import plain_offline as plain
 import pytest
 from plain_data import episodes_of, random_data
 from random_worlds import random_world
@@ -27,7 +28,6 @@ from taichi_ants.offline.learners import (
     pessimistic_q_iteration,
     tolerance,
 )
-from taichi_ants.reference import offline as plain
 
 LEARNERS = (batch_q_learning, fitted_q_iteration, pessimistic_q_iteration)
 

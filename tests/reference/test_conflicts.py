@@ -56,11 +56,6 @@ def test_equal_hashes_are_decided_by_the_heading():
     assert winners(intents[::-1], 0, lambda cell: 7) == {1}
 
 
-def test_those_who_want_different_cells_all_win():
-    intents = [wish(slot, 0, (slot, 0, 1)) for slot in range(4)]
-    assert winners(intents, 3, lambda cell: cell[0]) == {0, 1, 2, 3}
-
-
 # Both ants have both foods in view.
 TWO_FOODS = World(
     (4, 4, 4),

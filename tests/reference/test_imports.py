@@ -30,17 +30,8 @@ ALLOWED = {
     "taichi_ants.features",
 }
 OUTSIDE = {
-    "__future__",
-    "collections",
-    "copy",
-    "dataclasses",
-    "enum",
-    "functools",
-    "math",
-    "numpy",
-    "struct",
-    "types",
-    "typing",
+    *("__future__", "collections", "copy", "dataclasses", "enum", "functools", "math", "numpy"),
+    *("types", "typing"),
 }
 RULES = {
     *("Caste", "Choice", "Field", "Food", "Labour", "Life"),

@@ -45,27 +45,24 @@ def td_error(name, value, reward, discount, next_values, next_action=0, epsilon=
     return float(result)
 
 
-@pytest.mark.parametrize("name", ["q_learning", "dyna_q", "prioritized_sweeping"])
-def test_q_learning_bootstraps_from_the_best(name):
-    # 1 + 0.5 * 4 - 0.5
-    assert td_error(name, 0.5, 1, 0.5, (2, -1, 4, 0, 0)) == 2.5
-    # 0 + 0.5 * (-1) - 0.5
-    assert td_error(name, 0.5, 0, 0.5, (-2, -1, -4, -8, -1)) == -1.0
+NEXT = (2, -1, 4, 0, 0)  # the next values; the present one is 0.5, and the reward is 1
 
 
-@pytest.mark.parametrize("name", ["sarsa", "sarsa_lambda", "n_step_sarsa"])
-def test_sarsa_bootstraps_from_the_next_action(name):
-    # 1 + 0.5 * 2 - 0.5 and 1 + 0.5 * (-1) - 0.5
-    assert td_error(name, 0.5, 1, 0.5, (2, -1, 4, 0, 0), next_action=0) == 1.5
-    assert td_error(name, 0.5, 1, 0.5, (2, -1, 4, 0, 0), next_action=1) == 0.0
-
-
-def test_expected_sarsa_mixes_best_and_mean():
-    # Mean (2 - 1 + 4) / 5 = 1; 4 + 0.5 * (1 - 4) = 2.5; 1 + 0.5 * 2.5 - 0.5.
-    assert td_error("expected_sarsa", 0.5, 1, 0.5, (2, -1, 4, 0, 0), epsilon=0.5) == 1.75
-    # Epsilon 0 is Q-learning; epsilon 1 the mean: 1 + 0.5 * 1 - 0.5.
-    assert td_error("expected_sarsa", 0.5, 1, 0.5, (2, -1, 4, 0, 0), epsilon=0.0) == 2.5
-    assert td_error("expected_sarsa", 0.5, 1, 0.5, (2, -1, 4, 0, 0), epsilon=1.0) == 1.0
+@pytest.mark.parametrize(
+    ("names", "options", "error"),
+    [
+        (("q_learning", "dyna_q", "prioritized_sweeping"), {}, 2.5),  # 1 + 0.5 * 4 - 0.5
+        (("sarsa", "sarsa_lambda", "n_step_sarsa"), {"next_action": 0}, 1.5),  # 1 + 0.5 * 2 - 0.5
+        (("sarsa", "sarsa_lambda", "n_step_sarsa"), {"next_action": 1}, 0.0),  # 1 - 0.5 - 0.5
+        # Mean (2 - 1 + 4) / 5 = 1; 4 + 0.5 * (1 - 4) = 2.5; 1 + 0.5 * 2.5 - 0.5.
+        (("expected_sarsa",), {"epsilon": 0.5}, 1.75),
+        (("expected_sarsa",), {"epsilon": 0.0}, 2.5),  # as Q-learning
+        (("expected_sarsa",), {"epsilon": 1.0}, 1.0),  # by the mean: 1 + 0.5 * 1 - 0.5
+    ],
+)
+def test_each_learner_bootstraps_from_its_next_value(names, options, error):
+    for name in names:
+        assert td_error(name, 0.5, 1, 0.5, NEXT, **options) == error
 
 
 @pytest.mark.parametrize("name", LEARNERS)

@@ -30,16 +30,6 @@ def after(trail, ticks):
     return trail
 
 
-@pytest.mark.parametrize("diffusion", [0.0, 1e-9])
-def test_linear_evaporation(diffusion):
-    trail = trail_of(plain_world(level=3), Pheromone(diffusion=diffusion))
-    levels = []
-    for _ in range(5):
-        levels.append(float(trail.level(MIDDLE)))
-        trail.tick()
-    assert levels == pytest.approx([3, 2, 1, 0, 0], abs=1e-6)
-
-
 @pytest.mark.parametrize("half_life", [1, 7.5, 50])
 def test_exponential_evaporation_halves(half_life):
     pheromone = Pheromone("exponential", half_life)

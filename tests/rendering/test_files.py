@@ -152,7 +152,7 @@ def test_a_full_disk_is_reported_with_the_file(tmp_path, frames, monkeypatch) ->
 
 
 REFUSED = {
-    **{name: ({"path": name}, r"\.gif or \.mp4") for name in ("a.avi", "a.png", "frames")},
+    **{name: ({"path": name}, r"\.gif or \.mp4") for name in ("a.avi", "frames")},
     **{f"fps {one}": ({"fps": one}, "fps") for one in (0, 51, float("nan"), True, "8")},
     "no frames": ({"frames": []}, "frames is empty"),
     "no iterable": ({"frames": 7}, "frames is 7"),

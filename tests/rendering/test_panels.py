@@ -73,24 +73,6 @@ def test_no_cell_in_view_is_cut_off_by_the_edge(size) -> None:
     assert (drawn == scene.draw(start, status)).all()
 
 
-def test_ants_of_the_legend_look_as_those_of_the_world() -> None:
-    """Drawn alike: darts in small cells, with legs in large ones, dots where cells are dots."""
-
-    def legend(side: int) -> np.ndarray:
-        grid = AxialGrid((side, side, 1))
-        frame = Scene(grid, (640, 400)).draw(at_start(World((side, side, 1), (0, 0, 0))))
-        return frame[230:393, 470:]  # the legend
-
-    legs, darts, dots = legend(4), legend(30), legend(200)
-    rows = slice(5 * 17, 7 * 17)  # the last two of seven entries
-    ink = []
-    for drawn in (legs, darts, dots):
-        assert (np.delete(drawn, rows, axis=0) == np.delete(darts, rows, axis=0)).all()
-        ink.append(int((drawn[rows, :20].max(axis=2) < 160).sum()))
-    assert 0 < ink[2] < min(ink[:2])
-    assert (darts != legs).any()
-
-
 def test_pictures_without_a_panel_are_the_world_alone() -> None:
     """Where text would not fit, or without the overlay."""
     for size in ((64, 64), (320, 322)):

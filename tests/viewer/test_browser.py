@@ -260,21 +260,6 @@ def test_a_page_on_which_nothing_changes_rests(ant):
     ant.settle()
 
 
-def test_a_page_is_printed_light_and_without_controls(browser, episode):
-    dark = Page(browser, episode[0], color_scheme="dark")
-    dark.tab.emulate_media(media="print", color_scheme="dark")
-    dark.read("dispatchEvent(new Event('beforeprint'))")
-    assert dark.read("document.documentElement.dataset.theme") == "light"
-    assert dark.read("viewer.stage.colours.page") == "#ffffff"
-    for hidden in ("#play", "#time", "#theme", "#zoom-in", "#hint", "#ant-close"):
-        assert dark.tab.is_hidden(hidden), hidden
-    for shown in ("#world", "#now", "#ant", "#curves", "#legend"):
-        assert dark.tab.is_visible(shown), shown
-    dark.read("dispatchEvent(new Event('afterprint'))")
-    assert dark.read("document.documentElement.dataset.theme") == "dark"
-    dark.close()
-
-
 def test_light_and_dark(browser, episode):
     dark = Page(browser, episode[0], color_scheme="dark")
     look = "document.documentElement.dataset.theme"

@@ -14,7 +14,7 @@ import pytest
 import taichi_ants
 from taichi_ants import Colony, TrainingConfig, World, commands, rollout, worlds
 from taichi_ants.learners.policies import save_policy, trail_follower
-from taichi_ants.rendering import Episode, colours
+from taichi_ants.rendering import Episode
 from taichi_ants.task import Caste, Food, Task
 from taichi_ants.viewer import record_colony, record_trace
 from taichi_ants.viewer.page import part
@@ -25,24 +25,6 @@ TITLE = 'An <ant> & its "trail"'
 @pytest.fixture(scope="module")
 def episode():
     return record_trace(Episode.play(worlds.paper(), trail_follower()).trace, TITLE)
-
-
-def test_light_colours_are_those_of_the_pictures():
-    light = dict(re.findall(r"--([a-z-]+): ([^;]+);", part("colours.css").split("}")[0]))
-    named = {
-        "page": colours.PAGE,
-        "empty": colours.CELL_EMPTY,
-        "rock": colours.CELL_OBSTACLE,
-        "food": colours.CELL_FOOD,
-        "queen": colours.CELL_QUEEN,
-        "food-floor": colours.FLOOR_FOOD,
-        "queen-floor": colours.FLOOR_QUEEN,
-        "ant": colours.ANT,
-        "ink": colours.INK,
-        "rule": colours.RULE,
-        "chosen": colours.CHOSEN,
-    }
-    assert {name: light[name] for name in named} == {k: f"#{v:06x}" for k, v in named.items()}
 
 
 def luminance(colour: str) -> float:
