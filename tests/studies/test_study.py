@@ -298,6 +298,17 @@ def test_damaged_blocks_are_set_aside_and_done_again(damage, study, tmp_path):
     assert path.with_suffix(".damaged").exists()
 
 
+def test_a_block_that_lacks_an_array_is_done_again_at_once(study, tmp_path):
+    first, path = outcomes_of(study, tmp_path), files_in(tmp_path)[2]
+    with np.load(path) as file:
+        arrays = dict(file)
+    arrays.popitem()
+    np.savez(path, **arrays)
+    run(study, store := Store(tmp_path))
+    assert store.damaged == [path]
+    assert same(found_in(study, tmp_path), first)
+
+
 def test_an_interruption_loses_one_block_at_most(study, tmp_path):
     def stop(share):
         if share > 0.4:
