@@ -289,7 +289,7 @@ MUTATIONS = [
         STUDIES,
     ),
     ("studies/store.py", "if all(parts_of(", "if True or all(parts_of(", STUDIES),
-    ("studies/store.py", "np.nan if array.dtype.kind", "0 if array.dtype.kind", GROWING),
+    ("studies/store.py", "np.nan if array.dtype.kind", "0 if array.dtype.kind", STUDIES),
     ("studies/study.py", "indices, -(-len(indices) // most))", "indices, 1)", STUDIES),
     ("studies/study.py", "- work / 2", "", STUDIES),
     ("studies/points.py", "[*chain(point.after), point] if", "[point] if", STUDIES),

@@ -309,6 +309,14 @@ def test_a_block_that_lacks_an_array_is_done_again_at_once(study, tmp_path):
     assert same(found_in(study, tmp_path), first)
 
 
+def test_runs_that_are_missing_are_read_as_nan_or_0(tmp_path):
+    store = Store(tmp_path)
+    store.add(["a"], [1], {"share": np.ones((1, 1)), "number": np.ones((1, 1), int)})
+    found = store.read(["a"], [1, 2], ["share", "number"], part=True)
+    assert np.array_equal(found["share"], [[1, np.nan]], equal_nan=True)
+    assert found["number"].tolist() == [[1, 0]]
+
+
 def test_an_interruption_loses_one_block_at_most(study, tmp_path):
     def stop(share):
         if share > 0.4:
