@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Sequence
 from numbers import Real
 
@@ -103,43 +104,40 @@ def checked_configs(
     configs: TrainingConfig | Sequence[TrainingConfig], task: Task | None = None
 ) -> tuple[TrainingConfig, ...]:
     """Return one or several configurations as a tuple, with the defaults of hyperparameters."""
-    several = [configs] if isinstance(configs, TrainingConfig) else entries_of(configs)
-    if not several:
+    listed = [configs] if isinstance(configs, TrainingConfig) else entries_of(configs)
+    if not listed:
         raise AntsError(f"configs is {shown(configs)}; give one TrainingConfig or several.")
-    settled = tuple(learners.with_hyperparameters(config) for config in several)
+    complete = tuple(learners.with_hyperparameters(config) for config in listed)
     if task is not None:
-        for config in settled:
+        for config in complete:
             check_learner(config, task)
-    return settled
+    return complete
 
 
 def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
     """Return one or several seeds as a tuple; AntsError if two are equal."""
-    if isinstance(seeds, np.ndarray):
-        seeds = seeds.ravel().tolist()
-    given = entries_of(seeds)
-    listed = [seeds] if given is None else given
-    several = tuple(checked_whole("a seed", seed, -(2**63), 2**64 - 1) for seed in listed)
-    if not several:
+    listed = entries_of(seeds.ravel().tolist() if isinstance(seeds, np.ndarray) else seeds)
+    listed = [seeds] if listed is None else listed
+    checked = tuple(checked_whole("a seed", seed, -(2**63), 2**64 - 1) for seed in listed)
+    if not checked:
         raise AntsError("seeds is empty; give at least one whole number.")
-    taken: set[int] = set()
-    for seed in several:
-        if seed % 2**64 in taken:
+    words = Counter(seed % 2**64 for seed in checked)
+    for seed in checked:
+        if words[seed % 2**64] > 1:
             raise AntsError(
                 f"seeds contains {seed} more than once; give seeds that differ modulo 2**64."
             )
-        taken.add(seed % 2**64)
-    return several
+    return checked
 
 
 def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.ndarray:
     """Return a seed for each table of the given leading shape, as a flat object array."""
-    several = checked_seeds(seeds)
-    if len(several) != 1 and (not shape or shape[-1] != len(several)):
+    listed = checked_seeds(seeds)
+    if len(listed) != 1 and (not shape or shape[-1] != len(listed)):
         tables = f"{' x '.join(map(str, shape))} tables" if shape else "one table"
         allowed = f"1 seed or {shape[-1]} seeds" if shape else "1 seed"
-        raise AntsError(f"there are {len(several)} seeds for {tables}; give {allowed}.")
-    return np.broadcast_to(np.array(several, dtype=object), shape or (1,)).ravel()
+        raise AntsError(f"there are {len(listed)} seeds for {tables}; give {allowed}.")
+    return np.broadcast_to(np.array(listed, dtype=object), shape or (1,)).ravel()
 
 
 def checked_max_steps(value: int, task: Task) -> int:

@@ -105,16 +105,14 @@ def _naming_plugins() -> Iterator[None]:
 
 def last_line(error: Exception) -> str:
     """Return Taichi's error message in one line, without the place in the source."""
-    lines = [line for line in str(error).splitlines() if line.strip()] or [type(error).__name__]
-    for line in lines:
-        outside = re.search(
-            r"Out of bound access to a \[(\d+)\] matrix with index \[(-?\d+)\]", line
-        )
-        if outside:
-            return "it uses index {1} of a vector of length {0}".format(*outside.groups())
-        if "Out of bound" in line:
-            return "it uses an index outside an array"
-    return lines[-1].strip().rstrip(".?").rsplit("Error: ", 1)[-1]
+    text = str(error)
+    outside = re.search(r"Out of bound access to a \[(\d+)\] matrix with index \[(-?\d+)\]", text)
+    if outside:
+        return "it uses index {1} of a vector of length {0}".format(*outside.groups())
+    if "Out of bound" in text:
+        return "it uses an index outside an array"
+    *_, last = [line for line in text.splitlines() if line.strip()] or [type(error).__name__]
+    return last.strip().rstrip(".?").rsplit("Error: ", 1)[-1]
 
 
 class _Pack(ArgPack):

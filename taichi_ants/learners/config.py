@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any
 
 from taichi_ants.errors import AntsError, shown
@@ -85,9 +84,6 @@ class TrainingConfig(Settings, path="training"):
                 f"hyperparameters is {shown(hyperparameters)}; it must be a mapping of names to "
                 "numbers."
             ) from None
-        for name, value in pairs.items():
-            if not isinstance(value, Real) or isinstance(value, bool):
-                raise AntsError(f"{name} is {shown(value)}; it must be a number.")
         plain = {name: getattr(value, "item", lambda v=value: v)() for name, value in pairs.items()}
         object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
 

@@ -30,21 +30,10 @@ def test_rates_fall_by_their_factors_down_to_their_least():
     assert epsilons == [0.8, 0.4, 0.3, 0.3]
 
 
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"planning_steps": "3"}, "planning_steps is '3'; it must be a number."),
-        ({"planning_steps": True}, "planning_steps is True; it must be a number."),
-        (
-            {"hyperparameters": 3},
-            "hyperparameters is 3; it must be a mapping of names to numbers.",
-        ),
-    ],
-)
-def test_other_mistakes(changes, says):
+def test_other_mistakes():
     with pytest.raises(AntsError) as caught:
-        TrainingConfig(**{**GOOD, **changes})
-    assert str(caught.value) == says
+        TrainingConfig(**{**GOOD, "hyperparameters": 3})
+    assert str(caught.value) == "hyperparameters is 3; it must be a mapping of names to numbers."
 
 
 @pytest.mark.parametrize(
@@ -57,6 +46,8 @@ def test_other_mistakes(changes, says):
             "is not a setting of q_learning",
         ),
         ("dyna_q", "planning_steps", 2.0, "`training.planning_steps` is 2.0; it must be a whole"),
+        ("dyna_q", "planning_steps", "3", "`training.planning_steps` is '3'; it must be a whole"),
+        ("dyna_q", "planning_steps", True, "`training.planning_steps` is True; it must be a whole"),
         (
             "dyna_q",
             "trace_decay",

@@ -180,7 +180,9 @@ class Runs:
         """
         learner = learners.get(configs[0].learner)
         more = learner.settings(configs[0])
-        settings = [(*(getattr(one, name) for name in SETTINGS), *astuple(more)) for one in configs]
+        settings = [
+            (*(getattr(config, name) for name in SETTINGS), *astuple(more)) for config in configs
+        ]
         if state is None:
             state = RunState.initial(configs, seeds, task.n_states).part(slice(None))
         return cls(
@@ -221,7 +223,7 @@ class Runs:
         return self.world.grid.size + EXTRA_CELLS
 
     def compiled(self, traced: bool = False) -> Callable[..., None]:
-        """Return a function (some, episodes, **arrays), after compiling its kernel.
+        """Return a function (runs, episodes, **arrays), after compiling its kernel.
 
         It does some episodes of some runs, both slices, and writes the results into the arrays. All
         arrays of a launch are flat, one run after another. The sizes of a memory are multiples of
@@ -238,25 +240,25 @@ class Runs:
         falls = task.evaporation_in_training if self.learner else task.evaporation_in_evaluation
         common = {**laid_out([self.world], task, falls), "max_steps": self.max_steps}
 
-        def do(some: slice, episodes: slice, **arrays: Any) -> None:
-            n = some.stop - some.start
+        def do(runs: slice, episodes: slice, **arrays: Any) -> None:
+            n = runs.stop - runs.start
             values = {
                 "n_runs": n,
                 "n_episodes": episodes.stop - episodes.start,
                 "regrows": 0,  # food that grows back at once has no effect after a delivery
-                "start_cells": cells[some],
-                "start_headings": headings[some],
-                "settings": self.settings[some],
-                "epsilon": state.epsilon[some],
-                "learning_rate": state.learning_rate[some],
-                "random_states": state.random_states[some],
-                "streams": np.ascontiguousarray(self.streams[some, episodes]),
+                "start_cells": cells[runs],
+                "start_headings": headings[runs],
+                "settings": self.settings[runs],
+                "epsilon": state.epsilon[runs],
+                "learning_rate": state.learning_rate[runs],
+                "random_states": state.random_states[runs],
+                "streams": np.ascontiguousarray(self.streams[runs, episodes]),
                 "tables": state.q.shape[1],
                 "floats_by_8": state.floats.shape[1] // 8,
                 "integers_by_8": state.integers.shape[1] // 8,
-                "q": state.q[some],
-                "floats": state.floats[some],
-                "integers": state.integers[some],
+                "q": state.q[runs],
+                "floats": state.floats[runs],
+                "integers": state.integers[runs],
                 "cells": np.empty(n * self.cells_of_a_run, np.int32),
                 "keeps_tables": 0,  # 1 to write the table after each step
                 "outcomes": np.zeros((0, 0, 0), np.int32),  # (3, n, n_episodes): `OUTCOMES`
@@ -292,12 +294,12 @@ class Runs:
         sizes = self.cells_of_a_run, max(array[0].size for array in vars(self.state).values())
         size = size_of_launch(workers, episodes, self.max_steps, self.cost, *sizes)
         seconds = 0.0
-        for some, part in pieces(len(self), episodes, *size, progress):
-            block = np.empty_like(outcomes[:, some, part], order="C")
+        for runs, part in pieces(len(self), episodes, *size, progress):
+            block = np.empty_like(outcomes[:, runs, part], order="C")
             began = clock()
-            launch(some, part, outcomes=block)
+            launch(runs, part, outcomes=block)
             seconds += clock() - began
-            outcomes[:, some, part] = block
+            outcomes[:, runs, part] = block
         return seconds
 
     def record(
@@ -317,19 +319,19 @@ class Runs:
         most_runs = MAX_ROLLOUT_STEPS // max(max_steps, self.world.grid.size // 10)
         runs_each = max(1, min(len(self), most_runs))
         episodes_each = max(1, MAX_ROLLOUT_STEPS // (runs_each * max_steps))
-        for some, part in pieces(len(self), episodes, runs_each, episodes_each, progress):
-            n_runs, n_episodes = some.stop - some.start, part.stop - part.start
+        for runs, part in pieces(len(self), episodes, runs_each, episodes_each, progress):
+            n_runs, n_episodes = runs.stop - runs.start, part.stop - part.start
             capacity = n_episodes * max_steps  # the most steps of a run
             trace = np.empty((n_runs * capacity, len(TRACE)), np.int32)
             chances, errors = np.empty(n_runs * capacity), np.empty(n_runs * capacity, np.float32)
             outcomes = np.zeros((len(OUTCOMES), n_runs, n_episodes), np.int32)
             arrays = {"trace": trace, "trace_errors": errors, "trace_chances": chances}
-            launch(some, part, outcomes=outcomes, **arrays, **keeps)
+            launch(runs, part, outcomes=outcomes, **arrays, **keeps)
             steps_of_run = outcomes[STEPS].sum(axis=1)
             taken = (np.arange(capacity) < steps_of_run[:, None]).reshape(-1)
             columns = dict(zip(TRACE, trace[taken].T, strict=True))
             columns["episodes"] += part.start
-            columns["runs"] = np.repeat(np.arange(some.start, some.stop), steps_of_run)
+            columns["runs"] = np.repeat(np.arange(runs.start, runs.stop), steps_of_run)
             yield {**columns, "chances": chances[taken], "td_errors": errors[taken]}
 
 

@@ -253,19 +253,17 @@ def trace_training(
     """
     task, max_steps = arguments.checked_run(world, task, max_steps, learns=True)
     episodes = checked_whole("episodes", episodes)
-    several = arguments.checked_configs(config, task)
-    if len(several) > 1:
-        raise AntsError(f"config has {len(several)} configurations; pass a single one.")
+    (config,) = arguments.checked_configs(config, task)
     _check_length(episodes * max_steps, min(MAX_ROLLOUT_STEPS, MAX_TABLE_ROWS // task.n_states))
     seeds = arguments.checked_seeds_for(seed, ()).tolist()
-    runs = Runs.learning(world, task, max_steps, several, seeds)
+    runs = Runs.learning(world, task, max_steps, [config], seeds)
     before = runs.state.q[:, 0, :, :N_ACTIONS].copy()
     tables = np.empty((episodes * max_steps, *runs.state.q.shape[2:]), dtype=np.float32)
     (steps,) = runs.record(episodes, tables=tables)
     n = len(steps["states"])
     after = tables[:n, :, :N_ACTIONS]
     values = np.concatenate([before, after[:-1]])[np.arange(n), steps["states"]]
-    made_by = RolloutArguments(world, task, seeds[0], max_steps, config=several[0])
+    made_by = RolloutArguments(world, task, seeds[0], max_steps, config=config)
     more = {"q_values": values, "td_errors": steps["td_errors"], "tables": after}
     return _trace(world, steps, **more, arguments=made_by)
 
