@@ -1,4 +1,4 @@
-"""What is handed on: the wheel, the source distribution, the editable install, the command."""
+"""What is handed on: the wheel, the source distribution, the command."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from taichi_ants.viewer.page import SCRIPTS, STYLES
 BUILD = """
 import sys
 from hatchling import build
-for kind in ("wheel", "sdist", "editable"):
+for kind in ("wheel", "sdist"):
     print(getattr(build, f"build_{kind}")(f"{sys.argv[1]}/{kind}"))
 """
 
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """The three by their kind."""
+    """The two by their kind."""
     place = tmp_path_factory.mktemp("built")
     done = subprocess.run(
         [sys.executable, "-c", BUILD, str(place)],
@@ -37,7 +37,7 @@ def built(tmp_path_factory):
     )
     return {
         kind: place / kind / name
-        for kind, name in zip(("wheel", "sdist", "editable"), done.stdout.split(), strict=True)
+        for kind, name in zip(("wheel", "sdist"), done.stdout.split(), strict=True)
     }
 
 
@@ -77,14 +77,6 @@ def test_the_source_distribution_can_run_the_tests(built):
         assert sources(folder) <= names
     others = ("pyproject.toml", "README.md", "LICENSE", "experiments/maps/garden.txt")
     assert {*others, "renders/episode.gif", ".ci/run"} <= names
-
-
-def test_an_editable_install_is_a_path(built):
-    """Which type checkers follow; they do not run a finder of modules."""
-    with zipfile.ZipFile(built["editable"]) as wheel:
-        (path,) = [name for name in wheel.namelist() if name.endswith(".pth")]
-        assert wheel.read(path).decode().strip() == str(ROOT)
-        assert not [name for name in wheel.namelist() if name.endswith(".py")]
 
 
 def call(arguments, folder, *options, kernels=None):

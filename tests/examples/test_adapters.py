@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taichi_ants import Colony, Life, Task, TrainingConfig, record, record_colony, worlds
+from taichi_ants import Colony, Life, Task, TrainingConfig, record_colony, worlds
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
 from taichi_ants.envs.formats import FORMATS, Shown
 from taichi_ants.learners.policies import trail_follower
@@ -33,37 +33,6 @@ def test_a_data_set_is_the_same_after_minari(form, tmp_path, monkeypatch) -> Non
         states = [*data.state[rows], data.next_state[rows][-1]]
         assert shown.states(episode.observations).tolist() == states
         assert episode.rewards.tolist() == data.reward[rows].tolist()
-
-
-@pytest.mark.filterwarnings("ignore::UserWarning:minari")
-def test_a_data_set_of_another_program_gets_a_world_and_unknown_probabilities(
-    tmp_path, monkeypatch
-) -> None:
-    minari = pytest.importorskip("minari")
-    pytest.importorskip("h5py")
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    from gymnasium import spaces
-    from minari.data_collector import EpisodeBuffer
-
-    from examples.minari_data import from_minari
-
-    data = record(worlds.paper(), None, 3, 4, 20)
-    buffers = [
-        EpisodeBuffer(
-            observations=np.append(data.state[a:b], data.next_state[b - 1]).astype(np.int64),
-            actions=data.action[a:b],
-            rewards=data.reward[a:b].astype(float),
-            terminations=np.zeros(b - a, bool),
-            truncations=np.zeros(b - a, bool),  # the collector was stopped
-        )
-        for a, b in zip(data.begins[:-1], data.begins[1:], strict=True)
-    ]
-    form = {"action_space": spaces.Discrete(5), "observation_space": spaces.Discrete(128)}
-    minari.create_dataset_from_buffers("others/ants-v0", buffers, **form)
-    read = from_minari("others/ants-v0", worlds.paper(), form="index")
-    assert np.array_equal(read.state, data.state)
-    assert np.array_equal(read.truncated, data.truncated)
-    assert np.isnan(read.behaviour_probability).all()
 
 
 def adapted(n: int, **settings):

@@ -271,6 +271,25 @@ def test_damaged_blocks_are_set_aside_and_done_again(damage, study, tmp_path):
     assert path.with_suffix(".damaged").exists()
 
 
+def test_a_block_that_lacks_an_array_is_done_again_at_once(study, tmp_path):
+    first, path = outcomes_of(study, tmp_path), files_in(tmp_path)[2]
+    with np.load(path) as file:
+        arrays = dict(file)
+    arrays.popitem()
+    np.savez(path, **arrays)
+    run(study, store := Store(tmp_path))
+    assert store.damaged == [path]
+    assert same(found_in(study, tmp_path), first)
+
+
+def test_runs_that_are_missing_are_read_as_nan_or_0(tmp_path):
+    store = Store(tmp_path)
+    store.add(["a"], [1], {"share": np.ones((1, 1)), "number": np.ones((1, 1), int)})
+    found = store.read(["a"], [1, 2], ["share", "number"], part=True)
+    assert np.array_equal(found["share"], [[1, np.nan]], equal_nan=True)
+    assert found["number"].tolist() == [[1, 0]]
+
+
 def test_an_interruption_loses_one_block_at_most(study, tmp_path):
     def stop(share):
         if share > 0.4:
