@@ -288,7 +288,6 @@ MUTATIONS = [
         "is_whole = True or set(file.files)",
         STUDIES,
     ),
-<<<<<<< HEAD
     ("studies/store.py", "if all(parts_of(name, block", "if any(parts_of(name, block", STUDIES),
     ("studies/store.py", "np.nan if array.dtype.kind", "0 if array.dtype.kind", GROWING),
     ("studies/study.py", "(indices, -(-len(indices) // most))", "(indices, 1)", STUDIES),
@@ -299,28 +298,11 @@ MUTATIONS = [
     ("studies/points.py", " if setting != _default(each)}", "}", STUDIES),
     ("studies/points.py", '"physics": PHYSICS, "kind"', '"kind"', STUDIES),
     ("studies/points.py", "= declared.checked(settings[declared.name])", "= 0.5", STUDIES),
-=======
-    ("studies/store.py", "if all(parts_of(", "if True or all(parts_of(", STUDIES),
-    ("studies/store.py", "np.nan if array.dtype.kind", "0 if array.dtype.kind", STUDIES),
-    ("studies/study.py", "indices, -(-len(indices) // most))", "indices, 1)", STUDIES),
-    ("studies/study.py", "- work / 2", "", STUDIES),
-    ("studies/points.py", "[*chain(point.after), point] if", "[point] if", STUDIES),
-    ("studies/study.py", "needed & first.missing(store)", "needed & False", STUDIES),
-    ("studies/study.py", "len(failed) == _HOPELESS and", "False and", EXECUTORS),
-    ("studies/points.py", "if setting != _default(each)}", "}", STUDIES),
-    ("studies/points.py", '"physics": PHYSICS, "kind"', '"kind"', STUDIES),
-    ("studies/points.py", "= declared.checked(", "= (", STUDIES),
->>>>>>> proof
     ("studies/executors.py", "if deaths[piece] < TRIES:", "if False:", EXECUTORS),
     ("studies/executors.py", "if of_study != versions():", "if False:", EXECUTORS),
     ("studies/executors.py", "while len(coming) < 2 * workers:", "while True:", EXECUTORS),
     ("studies/ray.py", "            _check_listens(address)", "            pass", RAY),
-<<<<<<< HEAD
     ("studies/folder.py", 'runs in ("points", "seeds")):', 'runs in ("points",)):', GROWING),
-=======
-    ("studies/command_line.py", ".add_mutually_exclusive_group()", ".add_argument_group()", RAY),
-    ("studies/folder.py", 'for runs in ("points", "seeds")', 'for runs in ("points",)', GROWING),
->>>>>>> proof
     ("studies/folder.py", "if before and not force:", "if False:", GROWING),
     ("studies/folder.py", "and checksum_of(folder / name) == checksum", "", GROWING),
     ("studies/sweep.py", "array[p, s].astype(float)", "array[p, 0].astype(float)", GROWING),
