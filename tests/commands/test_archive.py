@@ -121,7 +121,8 @@ def test_an_archive_repeats_itself_without_the_files_that_the_study_read(here, c
     assert status == 0
     assert err.startswith("Running code of the archive: results/inputs/plugin/")
     names = sorted(json_in(here / "done" / "manifest.json")["files"])
-    assert [line.split() for line in lines[-len(names) :]] == [["equal", name] for name in names]
+    *lines, verdict = out.splitlines()[-len(names) - 1 :]  # below the report
+    assert [line.split() for line in lines] == [["equal", name] for name in names]
     assert verdict == f"All {len(names)} files are equal: the study is reproduced."
     assert Path("ran").exists()
     assert_same_results(here / "done", "results/reproduced-done")
