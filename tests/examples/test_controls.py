@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from utility import Foraging
 
 from taichi_ants import Colony, TrainingConfig, World, task, train
+from taichi_ants.interventions import RemoveAnts
 from taichi_ants.learners import registry as learners
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task import Caste, Noise, Threshold
@@ -147,8 +148,7 @@ def test_times_to_recover_by_hand(script):
 def test_removing_no_ants_does_not_matter_and_removing_them_does(script):
     found = script("models/recovery", REMOVAL=100, TICKS=250)
     none, half, all_of_them = (found["ants_over_time"]([0, 1], x) for x in (0.0, 0.5, 1.0))
-    untouched = SimpleNamespace(apply=lambda interventions: None)
-    found["RemoveAnts"] = lambda share: untouched
+    found["RemoveAnts"] = lambda share: RemoveAnts(share=0.0)
     assert np.array_equal(found["ants_over_time"]([0, 1], 0.5), none)
     before, at = slice(0, 2), 2
     assert np.array_equal(half[:, before], none[:, before])
