@@ -7,7 +7,7 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from taichi_ants.environment import prepare_for_taichi
+from taichi_ants.process_variables import prepare_for_taichi
 
 if TYPE_CHECKING:
     from taichi_ants import (

@@ -21,8 +21,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from taichi_ants.environment import fallback_folder, is_writable_folder
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
+from taichi_ants.process_variables import fallback_folder, is_writable_folder
 from taichi_ants.subnormals import Flushing
 
 ARCHITECTURES = ("cpu", "cuda")

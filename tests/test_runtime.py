@@ -10,7 +10,7 @@ import tempfile
 import pytest
 from command_lines import ROOT
 
-from taichi_ants.environment import fallback_folder, prepare_for_taichi
+from taichi_ants.process_variables import fallback_folder, prepare_for_taichi
 
 BEGINNING = """
 import sys

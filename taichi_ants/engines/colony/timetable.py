@@ -18,7 +18,7 @@ class Timetable:
     """The events of a protocol in the episodes of a `Colony`, which imports this module.
 
     A context manager for an episode that has begun. At its end, the numbers and tables of the
-    colony are again those of its beginning; `ColonyState.begin` resets the worlds.
+    colony are again those of its beginning; `ColonyState.lay_out` resets the worlds.
 
     Raises:
         AntsError: An event cannot happen in an episode of `length` ticks, or in this colony.
