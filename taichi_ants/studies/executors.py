@@ -87,7 +87,7 @@ def completed(
                     break
                 work = pickle.dumps(work_of(following), -1)
                 try:
-                    future = executor.submit(do, versions(), tuple(code), work)
+                    future = executor.submit(run_pickled, versions(), tuple(code), work)
                 except (BrokenExecutor, RuntimeError) as refusal:
                     why = f"{type(refusal).__name__}: {refusal}"
                     raise LostWorkersError(
@@ -124,7 +124,7 @@ def versions() -> Versions:
     return __version__, PHYSICS, ".".join(platform.python_version_tuple()[:2])
 
 
-def do(of_study: Versions, code: Sequence[Code], pickled: bytes) -> Any:
+def run_pickled(of_study: Versions, code: Sequence[Code], pickled: bytes) -> Any:
     """Return the outcome of pickled work; this is what workers run.
 
     Raises:

@@ -135,7 +135,7 @@ class RunPoint:
         return (self.episodes or self.rollouts) * self.max_steps / _STEPS_OF_A_SECOND
 
     @staticmethod
-    def do(
+    def compute(
         points: Sequence[RunPoint],
         seeds: Sequence[int],
         learned: np.ndarray | None,
@@ -343,7 +343,7 @@ class ColonyPoint:
         return Colony(world, self.task, training, seeds, **options)
 
     @staticmethod
-    def do(
+    def compute(
         points: Sequence[ColonyPoint],
         seeds: Sequence[int],
         learned: np.ndarray | None,

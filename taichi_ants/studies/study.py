@@ -263,7 +263,7 @@ def outcome_of(
 
     `learned` are the tables of the point `after`, float32 (seeds, n_states, 5), or None.
     """
-    outcome = points[0].do(points, seeds, learned, progress or (lambda share: None), where)
+    outcome = points[0].compute(points, seeds, learned, progress or (lambda share: None), where)
     outcome = {**outcome, **(measure(points, seeds, outcome) if measure else {})}
     for name in arrays:
         if not parts_of(name, outcome):

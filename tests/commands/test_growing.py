@@ -99,13 +99,13 @@ def test_a_finished_sweep_grows_without_repeating_anything(kind, sweep, monkeypa
     assert sweep(SWEEPS[kind], "plain")[0] == 0
     assert sweep(FEWER[kind], "grown")[0] == 0
     owner = ColonyPoint if kind == "colony" else RunPoint
-    done, real = [], owner.do
+    done, real = [], owner.compute
 
     def do(points, seeds, *more):
         done.extend((point, seed) for point in points for seed in seeds)
         return real(points, seeds, *more)
 
-    monkeypatch.setattr(owner, "do", staticmethod(do))
+    monkeypatch.setattr(owner, "compute", staticmethod(do))
     assert sweep(SWEEPS[kind], "grown")[::2] == (0, "")
     assert len(done) == len(set(done)) == {"runs": 24 - 8, "colony": 8 - 2, "drawn": 32 - 16}[kind]
     assert_same_results("plain", "grown")
@@ -185,7 +185,7 @@ def test_a_table_that_was_changed_or_removed_is_written_again(sweep, monkeypatch
     with open("a/runs.csv", "a") as file:
         file.write("0,0,0,0,0\n")
     Path("a/summary.csv").unlink()
-    monkeypatch.setattr(RunPoint, "do", None)
+    monkeypatch.setattr(RunPoint, "compute", None)
     assert sweep(RUNS, "a")[::2] == (0, "")
     after = contents(Path("a"))
     assert {name for name in after if after[name] != before.get(name)} <= {"manifest.json"}
@@ -257,7 +257,7 @@ def test_shards_that_do_not_exist_are_refused(shard, sweep):
 
 
 def test_status_and_tables_of_work_in_progress(sweep, capsys, monkeypatch):
-    real, seen = RunPoint.do, []
+    real, seen = RunPoint.compute, []
 
     def fails(points, seeds, *more):
         if 0.2 in (point.training.learning_rate for point in points) and 1 in seeds:
@@ -265,7 +265,7 @@ def test_status_and_tables_of_work_in_progress(sweep, capsys, monkeypatch):
         seen.append(call("status", ["a"], capsys))
         return real(points, seeds, *more)
 
-    monkeypatch.setattr(RunPoint, "do", staticmethod(fails))
+    monkeypatch.setattr(RunPoint, "compute", staticmethod(fails))
     status, _, err = sweep(RUNS, "a")
     assert status == 1
     assert_one_sentence(err)
@@ -276,7 +276,7 @@ def test_status_and_tables_of_work_in_progress(sweep, capsys, monkeypatch):
     assert status == 0
     assert out.splitlines()[0] == "a"
     assert re.search(r"unfinished: \d+ of 24 runs done \(\d+ % of the work\), in \d+ blocks", out)
-    monkeypatch.setattr(RunPoint, "do", staticmethod(real))
+    monkeypatch.setattr(RunPoint, "compute", staticmethod(real))
     _, out, _ = call("status", ["a"], capsys)
     (done,) = re.findall(r"(\d+) of 24", out)
     assert "  failed: " in out
@@ -301,7 +301,7 @@ def test_status_and_tables_of_work_in_progress(sweep, capsys, monkeypatch):
 
 
 def test_the_time_left_is_that_of_the_last_process(sweep, monkeypatch):
-    real, calls = RunPoint.do, []
+    real, calls = RunPoint.compute, []
 
     def stops(*arguments):
         calls.append(arguments)
@@ -309,7 +309,7 @@ def test_the_time_left_is_that_of_the_last_process(sweep, monkeypatch):
             raise KeyboardInterrupt
         return real(*arguments)
 
-    monkeypatch.setattr(RunPoint, "do", staticmethod(stops))
+    monkeypatch.setattr(RunPoint, "compute", staticmethod(stops))
     assert sweep(RUNS, "a")[0] == 130
     (one,) = sessions_in(Path("a"))
     blocks = sorted(Path("a/blocks").iterdir(), key=os.path.getmtime)
@@ -335,7 +335,7 @@ def test_tables_are_written_as_parquet_too(sweep, capsys, monkeypatch):
         assert 'pip install -e ".[parquet]"' in err
     assert sweep(COLONY, "whole", "--parquet")[0] == 0
     assert sweep(COLONY, "plain")[0] == 0
-    monkeypatch.setattr(ColonyPoint, "do", None)
+    monkeypatch.setattr(ColonyPoint, "compute", None)
     assert sweep(COLONY, "plain", "--parquet")[0] == 0  # added to finished results
     assert_same_results("plain", "whole")
     for name in ("runs", "series", "summary"):

@@ -171,7 +171,7 @@ def test_figures_are_added_to_finished_results_without_new_runs(sweep, monkeypat
     assert sweep(RUNS, "--no-figures")[0] == 0
     folder = Path("results/sweep-my")
     before = contents(folder)
-    monkeypatch.setattr(RunPoint, "do", None)
+    monkeypatch.setattr(RunPoint, "compute", None)
     assert sweep(RUNS)[0] == 0
     after = contents(folder)
     assert {*after} - {*before} == {"figures/return_last50.png"}

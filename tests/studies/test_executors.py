@@ -17,7 +17,7 @@ from command_lines import promptly
 
 from taichi_ants import PHYSICS, AntsError, TrainingConfig
 from taichi_ants.studies import executors, plugins
-from taichi_ants.studies.executors import TRIES, LostWorkersError, Workers, completed, do
+from taichi_ants.studies.executors import TRIES, LostWorkersError, Workers, completed, run_pickled
 from taichi_ants.studies.points import ColonyPoint, Drawn, RunPoint
 from taichi_ants.studies.store import Store
 from taichi_ants.studies.study import FailedBlocksError, Study, run
@@ -106,7 +106,7 @@ class Deadly(Workers):
 
 def _die_or_do(marker, arguments):
     die_once(marker)
-    return do(*arguments)
+    return run_pickled(*arguments)
 
 
 @pytest.mark.slow
@@ -269,15 +269,15 @@ def test_few_blocks_are_in_flight():
 def test_workers_of_another_version_are_refused():
     said = rf"taichi_ants 0\.0\.1 \(physics {PHYSICS}\) and Python 3\.8, but a worker has"
     with pytest.raises(AntsError, match=said):
-        do(("0.0.1", PHYSICS, "3.8"), (), pickle.dumps(None))
+        run_pickled(("0.0.1", PHYSICS, "3.8"), (), pickle.dumps(None))
 
 
 def test_a_plugin_travels_as_text(monkeypatch):
     monkeypatch.setattr(plugins, "_loaded", {})
     text = b"import beside_it, pathlib\npathlib.Path(__file__).with_name('ran').touch()\n"
     plugin = {"here/plugin_that_travels.py": text, "here/beside_it.py": b"VALUE = 1\n"}
-    assert do(executors.versions(), (plugin,), pickle.dumps(dict)) == {}
+    assert run_pickled(executors.versions(), (plugin,), pickle.dumps(dict)) == {}
     assert Path(plugins._folders[-1].name, "ran").exists()
     changed = {**plugin, "here/beside_it.py": b"VALUE = 2\n"}
     with pytest.raises(AntsError, match=r"another file 'plugin_that_travels\.py'"):
-        do(executors.versions(), (changed,), pickle.dumps(dict))
+        run_pickled(executors.versions(), (changed,), pickle.dumps(dict))

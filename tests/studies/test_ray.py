@@ -136,7 +136,7 @@ def test_a_killed_worker_costs_its_blocks_only(plain, kernels, tmp_path):
     arguments = ["my.toml", "--out", "a", "--no-figures", "--ray"]
     process = start("sweep", arguments, kernels, tmp_path)
     wait_for_blocks(process, tmp_path)
-    os.kill(next(one for one, line in tree(process.pid).items() if "ray::do" in line), 9)
+    os.kill(next(one for one, line in tree(process.pid).items() if "ray::run_pickled" in line), 9)
     out, err = process.communicate(timeout=500)
     assert (process.returncode, err) == (0, "")
     assert "all results are in a/" in out

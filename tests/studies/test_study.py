@@ -213,9 +213,9 @@ def test_a_study_resumes_from_any_blocks(kind, study, tmp_path, monkeypatch):
     blocks = files_in(tmp_path)
     stamps = {file: file.stat().st_mtime_ns for file in blocks}
     owner = type(study.points[0])
-    real = owner.do
+    real = owner.compute
     do = staticmethod(lambda *given: calls.append(given) or real(*given))
-    monkeypatch.setattr(owner, "do", do)
+    monkeypatch.setattr(owner, "compute", do)
     assert same(outcomes_of(study, tmp_path), first)
     assert calls == []
     for file in blocks[::2]:

@@ -240,7 +240,7 @@ class Runs:
         falls = task.evaporation_in_training if self.learner else task.evaporation_in_evaluation
         common = {**laid_out([self.world], task, falls), "max_steps": self.max_steps}
 
-        def do(runs: slice, episodes: slice, **arrays: Any) -> None:
+        def launch_part(runs: slice, episodes: slice, **arrays: Any) -> None:
             n = runs.stop - runs.start
             values = {
                 "n_runs": n,
@@ -275,8 +275,8 @@ class Runs:
                     values[name] = flat if flat.size else np.zeros((1,) * flat.ndim, flat.dtype)
             launch({**values, **common})
 
-        do(slice(0, 0), slice(0, 0))
-        return do
+        launch_part(slice(0, 0), slice(0, 0))
+        return launch_part
 
     def do_episodes(self, outcomes: np.ndarray, progress: Progress | None = None) -> float:
         """Do the next episodes, update the state, and write `outcomes` (3, n, episodes).
