@@ -186,7 +186,7 @@ def steps_compared(
 @pytest.mark.parametrize(
     ("name", "ant_steps"),
     [
-        *(pytest.param(name, 3_500, marks=pytest.mark.slow) for name in SLOW),
+        *(pytest.param(name, 6_000, marks=pytest.mark.slow) for name in SLOW),
         # Two million in all, in ten minutes.
         *(pytest.param(name, 340_000, marks=pytest.mark.long) for name in MODELS),
         pytest.param("softmax", 2_500, marks=pytest.mark.optimised),
