@@ -292,7 +292,7 @@ def main(arguments: list[str] | None = None) -> None:
     with command_line.reporting(command_line.AGAIN):
         settings = parse_arguments(arguments)
         is_new = settings.force or not (settings.out / MANIFEST).exists()
-        # With --threads 1, there is no second process either.
+        # --threads 1 also means that no second process starts.
         draws = is_new and not settings.no_figures and settings.threads != 1
         with process.second(draws):
             run_study(settings, planned(__file__, settings))

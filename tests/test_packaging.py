@@ -1,4 +1,4 @@
-"""What is handed on: the wheel, the source distribution, the command."""
+"""The wheel, the source distribution, and the command that they install."""
 
 from __future__ import annotations
 

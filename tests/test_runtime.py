@@ -122,7 +122,7 @@ for now in (ti.lang.impl.current_cfg(), ti.lang.impl.get_runtime()):
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
 @pytest.mark.slow
 def test_a_forked_process_is_told_to_be_spawned(tmp_path):
-    """Whatever launches kernels, also what was made before; a fork before the start is fine."""
+    """A forked process cannot launch kernels, unless it was forked before Taichi started."""
     script = """
 import multiprocessing
 from taichi_ants import Colony, rollout

@@ -1,4 +1,4 @@
-"""What the kernels draw, against a slow picture made of many samples, and rules of drawing."""
+"""Kernels draw the same picture as a slow reference with many samples per pixel."""
 
 from __future__ import annotations
 

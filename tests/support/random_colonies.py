@@ -1,7 +1,7 @@
 """Random colonies: small crowded worlds with all options, learners and ways of sharing.
 
-Golden hashes belong to these draws, so that nothing is drawn in another order or range. What is new
-is drawn from a stream of its own.
+Golden hashes depend on the order and the ranges of these draws, so keep both. Draw new things from
+a new random stream.
 """
 
 from __future__ import annotations
