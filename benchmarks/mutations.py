@@ -163,7 +163,7 @@ MUTATIONS = [
     ),
     ("task/rules/policy.py", "cumulative <= drawn", "cumulative < drawn / 2", CHOICE),
     ("task/rules/policy.py", "(is_open_at * is_nearer).sum() > 0", "False", COLONY),
-    ("task/rules/numbers.py", "if m > ti.f64(SQRT_2)", "if m > ti.f64(2.0)", NUMBERS),
+    ("arithmetic/numbers.py", "if m > ti.f64(SQRT_2)", "if m > ti.f64(2.0)", NUMBERS),
     ("task/rules/noise.py", "ti.cast(other >= code", "ti.cast(other > code", CHOICE),
     (
         "task/rules/noise.py",
@@ -178,7 +178,7 @@ MUTATIONS = [
         "0 * c.streams[ant] != 1 + c.first",
         CHOICE,
     ),
-    ("task/rules/random_bits.py", "ti.u64(27)", "ti.u64(28)", RUNS),
+    ("arithmetic/random_bits.py", "ti.u64(27)", "ti.u64(28)", RUNS),
     ("task/rules/vision.py", "2 * level >= ti.max", "2 * level > ti.max", COLONY),
     ("task/rules/vision.py", "ti.max(strongest, 1)", "ti.max(strongest, 0)", RUNS),
     ("task/rules/vision.py", "nearer >> 1 & 1", "nearer >> 2 & 1", RUNS),

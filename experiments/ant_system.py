@@ -19,6 +19,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     from taichi_ants import AntsError, World, runtime, worlds
     from taichi_ants.arguments import checked_world
+    from taichi_ants.arithmetic.numbers import power
+    from taichi_ants.arithmetic.random_bits import advance, bits_of, high_word
     from taichi_ants.grid.constants import N_HEADINGS, STREAM_TOUR
     from taichi_ants.grid.randomness import stream_state
     from taichi_ants.settings import Count, Seed, Setting, checked_arguments
@@ -30,8 +32,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
         whole_number,
     )
     from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
-    from taichi_ants.task.rules.numbers import power
-    from taichi_ants.task.rules.random_bits import advance, bits_of, high_word
 
 Method = Literal["ant_system", "max_min"]
 METHODS: tuple[str, ...] = get_args(Method)

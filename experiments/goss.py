@@ -16,13 +16,13 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import taichi as ti
 
     from taichi_ants import runtime
+    from taichi_ants.arithmetic.numbers import power
+    from taichi_ants.arithmetic.random_bits import advance, bits_of, high_word, low_word
     from taichi_ants.errors import AntsError, checked_whole, count
     from taichi_ants.grid.constants import STREAM_BRIDGE
     from taichi_ants.grid.randomness import stream_state
     from taichi_ants.settings import Count, Seed, Setting, checked_arguments
     from taichi_ants.studies.command_line import THREADS, Parser, run_command, whole_number
-    from taichi_ants.task.rules.numbers import power
-    from taichi_ants.task.rules.random_bits import advance, bits_of, high_word, low_word
 
 # Percent of colonies for each ratio r of the branches, by the share of ants on the short branch:
 # 0-20 %, 20-40 %, 40-60 %, 60-80 %, 80-100 %.

@@ -25,6 +25,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     from taichi_ants import World, runtime, worlds
     from taichi_ants.analysis.statistics import bootstrap_interval
+    from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word, low_word
     from taichi_ants.grid.constants import N_HEADINGS, STREAM_FORAGER
     from taichi_ants.grid.randomness import stream_state
     from taichi_ants.settings import Count, Seed, Setting, Share, checked_arguments
@@ -36,7 +37,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
         whole_number,
     )
     from taichi_ants.task.rules.policy import bit_number
-    from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word, low_word
 
 SIZE = (30, 30, 30)
 WORLDS = {

@@ -18,7 +18,7 @@ from taichi_ants.errors import (
     expect,
     shown,
 )
-from taichi_ants.features import LONE, refuse_unsupported
+from taichi_ants.features.support import LONE, refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS

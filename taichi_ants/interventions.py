@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 import numpy as np
 
 from taichi_ants.errors import AntsError, check_one_of, count, entries_of, is_flag, shown, whole
+from taichi_ants.features import FEATURES
 from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.policies import NAMED, checked_values, load_policy
@@ -334,9 +335,10 @@ class SetTask(Intervention, path="task"):
         changed = self.changed(task)
         castes = {name: caste.fixed for name, caste in task.castes.items()}
         if castes != {name: caste.fixed for name, caste in changed.castes.items()}:
+            more = "".join(f", or {words}" for one in FEATURES for words in one.fixed)
             raise AntsError(
-                "the task cannot change the share, ants, nest or policy of a caste in an episode, "
-                "or whether it has thresholds; change its other numbers."
+                "the task cannot change the share, ants, nest or policy of a caste in an episode"
+                f"{more}; change its other numbers."
             )
         if Model(task, learns) != Model(changed, learns):
             old, new = flat(task.as_dict()), flat(changed.as_dict())

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from taichi_ants.errors import shown
+from taichi_ants.features import arrays
+from taichi_ants.features.feature import ANT
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.task.constants import QUEEN
 
@@ -42,6 +45,10 @@ def _none() -> np.ndarray:
     return np.zeros(0, np.int32)
 
 
+def _of_ants(view: str, snapshot: Snapshot) -> np.ndarray:
+    return snapshot.of_ants.get(view, _none())
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Snapshot(Record):
     """The state of one world at one time, which `rendering` draws and `measures` read.
@@ -62,8 +69,8 @@ class Snapshot(Record):
         food_kinds: uint8 (grid.size,), the kind of the food in each cell; 0 without food.
         queens: int32 (nests,), the flat cell index of the queen of each nest.
         ant_castes: int32 (n,), the castes of the ants; 0 without castes.
-        ant_idle: bool (n,), whether each ant is idle, see `Labour`.
-        ant_thresholds: float32 (n,), the response thresholds of the ants; 0 without one.
+        of_ants: The arrays (n,) of the features of the model by their views, which are attributes,
+            too, with "ant_" in front.
         fields: The levels of each pheromone by name, (grid.size,); "trail" is `trail`.
         counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers. Also
             `nest_deliveries`, `food_deliveries` and `caste_deliveries`, int32 (nests or kinds of
@@ -86,11 +93,14 @@ class Snapshot(Record):
     food_kinds: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint8))
     queens: np.ndarray = field(default_factory=_none)
     ant_castes: np.ndarray = field(default_factory=_none)
-    ant_idle: np.ndarray = field(default_factory=_none)
-    ant_thresholds: np.ndarray = field(default_factory=_none)
+    of_ants: Mapping[str, np.ndarray] = field(default_factory=dict)
     fields: Mapping[str, np.ndarray] = field(default_factory=dict)
     counts: Mapping[str, Any] = field(default_factory=dict)
     world: World | None = None
+
+    if TYPE_CHECKING:  # the views of arrays of features, see below
+
+        def __getattr__(self, name: str) -> np.ndarray: ...
 
     @property
     def further_fields(self) -> dict[str, np.ndarray]:
@@ -102,6 +112,10 @@ class Snapshot(Record):
         """Steps from each cell to the nearest queen, without obstacles, int32 (grid.size,)."""
         queens = self.grid.cells(np.flatnonzero(self.ground == QUEEN))
         return np.min([self.grid.distances(tuple(queen)) for queen in queens.tolist()], axis=0)
+
+
+for _, array in arrays(ANT):
+    setattr(Snapshot, f"ant_{array.view}", property(partial(_of_ants, array.view)))
 
 
 def same(value: object, other: object) -> bool:

@@ -10,11 +10,11 @@ import numpy as np
 from taichi_ants import learners, rules, runtime, worlds
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, checked_whole, listing
+from taichi_ants.features import FEATURES
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.records import Snapshot
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.rules import Rule
-from taichi_ants.rules.inputs import LABOUR
 from taichi_ants.settings import declared
 from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.constants import EMPTY
@@ -137,9 +137,9 @@ def _task(rule: Rule, seed: int) -> Task:
             value = float(rng.uniform(least, most))
             numbers[setting.name] = round(value) if setting.kind is int else value
     settings: dict = {"rules": {rule.name: numbers}}
-    if any(name in rule.inputs for name in LABOUR):
-        threshold = {"distribution": "uniform", "value": 5.0, "spread": 5.0}
-        settings |= {"labour": "thresholds", "castes": {"ants": {"threshold": threshold}}}
+    for feature in FEATURES:
+        if any(name in rule.inputs for name in feature.inputs):
+            settings |= feature.example
     if rule.kind == "choice":
         settings |= {"choice": {"rule": rule.name}, "noise": {"misread": 0.2 * drawn}}
     elif rule.kind == "reward":

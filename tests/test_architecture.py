@@ -18,9 +18,11 @@ import taichi_ants
 LAYERS = (
     {"errors", "process_variables", "subnormals"},
     {"files", "grid", "registry", "settings"},
+    {"arithmetic"},
+    {"features"},
     {"rules"},
     {"task"},
-    {"features", "runtime", "worlds", "learners"},
+    {"runtime", "worlds", "learners"},
     {"records"},
     {"arguments", "measures"},
     {"interventions"},
@@ -35,7 +37,10 @@ LAYERS = (
     {"__main__"},
 )
 # Kernels live in these; runtime starts Taichi.
-PARTS_WITH_TAICHI = {*("task", "learners", "engines", "rendering", "offline", "envs", "runtime")}
+PARTS_WITH_TAICHI = {
+    *("arithmetic", "features", "task", "learners", "engines", "rendering", "offline", "envs"),
+    "runtime",
+}
 
 FOLDERS = ("taichi_ants", "experiments", "examples")
 FILES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))

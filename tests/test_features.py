@@ -29,7 +29,7 @@ from taichi_ants.engines.runs.training import trace_policies
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
-from taichi_ants.features import COLONY, LONE
+from taichi_ants.features.support import COLONY, LONE
 from taichi_ants.learners.policies import Policy
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.setup import Setup

@@ -12,10 +12,10 @@ import numpy as np
 import taichi as ti
 
 from taichi_ants import runtime
+from taichi_ants.arithmetic.numbers import exponential, logarithm, power
 from taichi_ants.engines.launch import last_line
 from taichi_ants.rules.inputs import KINDS, values_shown
 from taichi_ants.rules.rule import TRIES, Rule, tries
-from taichi_ants.task.rules.numbers import exponential, logarithm, power
 
 
 @ti.func

@@ -24,13 +24,13 @@ from taichi_ants.envs.vector import (
     task_of,
 )
 from taichi_ants.errors import AntsError, checked_whole
-from taichi_ants.features import CASTES, CHOICE, COLONY
+from taichi_ants.features.support import BASE, CASTES, CHOICE
 from taichi_ants.task.constants import N_ACTIONS, RIGHT
 from taichi_ants.task.events import Event
 
 # The default length of a colony's episode, in ticks.
 MAX_STEPS = 1000
-SUPPORTS = COLONY - CHOICE - CASTES - {"choice.rule=softmax"}  # actions are given
+SUPPORTS = BASE - CHOICE - CASTES - {"choice.rule=softmax"}  # actions are given
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 

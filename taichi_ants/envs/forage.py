@@ -29,7 +29,7 @@ from taichi_ants.envs.vector import (
     task_of,
 )
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
-from taichi_ants.features import CHOICE, LONE
+from taichi_ants.features.support import CHOICE, LONE
 from taichi_ants.records import Snapshot
 from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
 from taichi_ants.worlds import text_map

@@ -2,10 +2,10 @@
 
 import taichi as ti
 
+from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.memory import discount_of, values_of
 from taichi_ants.task.constants import N_ACTIONS, ROW
-from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word
 
 
 @ti.func

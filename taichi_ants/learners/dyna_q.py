@@ -2,11 +2,11 @@
 
 import taichi as ti
 
+from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word
 from taichi_ants.learners import model
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.q_learning import td_error
 from taichi_ants.task.constants import ROW
-from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word
 
 
 @ti.func

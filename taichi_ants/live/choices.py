@@ -15,7 +15,7 @@ import numpy as np
 
 from taichi_ants import learners, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect
-from taichi_ants.features import refuse_unsupported
+from taichi_ants.features.support import refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
 from taichi_ants.live.setup import FORM_SUPPORTS, MOST_ANTS, MOST_TEXT, Setup

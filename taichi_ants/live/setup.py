@@ -13,7 +13,7 @@ from taichi_ants import files, learners, worlds
 from taichi_ants.arguments import checked_seeds, checked_share, checked_task
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
-from taichi_ants.features import CASTES, COLONY, FIELDS, FOODS, OWN_RULES
+from taichi_ants.features.support import BASE, CASTES, COLONY, FIELDS, FOODS, OWN_RULES
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import NAMED, checked_table
@@ -38,7 +38,7 @@ _MOST = {
 
 
 SUPPORTS = COLONY - OWN_RULES
-FORM_SUPPORTS = SUPPORTS - CASTES - FOODS - FIELDS  # of the form of the page
+FORM_SUPPORTS = BASE - OWN_RULES - CASTES - FOODS - FIELDS  # of the form of the page
 
 
 @dataclass(frozen=True, eq=False)

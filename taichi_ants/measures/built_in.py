@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants.errors import AntsError
+from taichi_ants.features import FEATURES
 from taichi_ants.measures.measure import COUNTS, Measure
 from taichi_ants.task.constants import FOOD, OBSTACLE, QUEEN
 from taichi_ants.task.events import Event
@@ -211,8 +212,8 @@ _LISTED = (
             "births that wait for a free cell or slot", COUNTS),
     Measure("carriers", lambda s: share_of(s.ant_carries), "",
             "share of the ants that carry food"),
-    Measure("foraging", lambda s: share_of(~s.ant_idle), "",
-            "share of the ants that forage, which are not idle"),
+    *(Measure(name, *measured) for feature in FEATURES
+      for name, measured in feature.measures.items()),
     Measure("distance", _distance, "steps", "mean distance of the ants to the nearest queen"),
     Measure("regions", _regions, "", "share of the ants in each region of the world",
             parts=lambda world, task: tuple(regions_of(world))),

@@ -11,7 +11,7 @@ from taichi_ants import arguments, runtime
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.engine import Progress, Runs
 from taichi_ants.errors import AntsError, checked_whole, expect
-from taichi_ants.features import CASTES, CHOICE, COLONY, FOODS, refuse_unsupported
+from taichi_ants.features.support import BASE, CASTES, CHOICE, FOODS, refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import action_probabilities, checked_values, random_policy
 from taichi_ants.offline.dataset import COLUMNS, Dataset
@@ -21,7 +21,7 @@ from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 # Of colonies: probabilities and rewards of actions must follow from action values and events.
-SUPPORTS = COLONY - CHOICE - CASTES - FOODS - {"nests", "reward"}
+SUPPORTS = BASE - CHOICE - CASTES - FOODS - {"nests", "reward"}
 SUPPORTS |= {"choice.rule=softmax", "choice.temperature"}
 _FROM_TRACE = {"step": "steps", "state": "states", "action": "actions", "reward": "rewards"}
 _FROM_TRACE |= {"next_state": "next_states", "terminated": "terminated", "episode": "episodes"}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.castes import lays
+from taichi_ants.reference.features import inputs_of
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick
@@ -48,7 +49,7 @@ class Intent:
             view, or the action is to give.
         shows_cue: Whether the target looks T or S or, with an ant on it, is better than its cell.
         gives: Whether the ant delivers.
-        rests: Whether the ant is idle; its action is then GIVE, which has no effect.
+        rests: Whether the ant rests; its action is then GIVE, which has no effect.
     """
 
     ant: Ant
@@ -189,8 +190,9 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
         laid = task.fields[name].deposited_when if name in task.fields else "with_food"
         for intent, start, had_food in acted:
             ant = intent.ant
+            of_features = inputs_of(world, ant, task)
             for cell in _marked(laid, intent, start, had_food) if lays(task, ant, name) else ():
-                trail.deposit(cell, ant, tick, world.pheromones, world.stimuli[ant.nest])
+                trail.deposit(cell, ant, tick, world.pheromones, of_features)
     for intent, *_ in acted:
         intent.ant.carried += 1
     world.ants = {intent.ant.cell: intent.ant for intent in intents}

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,9 +36,8 @@ class Ant:
         nest: The number of its nest.
         kind: The kind of the last food that it picked up.
         caste: The number of its caste.
-        threshold: Its response threshold, 0 without one.
         trait: Its number from 0 to less than 1, which never changes.
-        idle: Whether it does not forage; its last action is then -1 and its last event NONE.
+        own: Its values of the features of the model by name, see `reference.features`.
         paper_state: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
         state: The state index, by which the ant chooses and learns.
         misread: The codes of cells in view that the ant misreads, by turns from its heading.
@@ -66,9 +65,12 @@ class Ant:
     nest: int = 0
     kind: int = 0
     caste: int = 0
-    threshold: np.float32 = field(default_factory=lambda: np.float32(0))
     trait: float = 0.0
-    idle: bool = False
+    own: dict[str, Any] = field(default_factory=dict)
+
+    def copy(self) -> Ant:
+        """Return the ant as it is now; its random stream stays the same."""
+        return replace(self, own={**self.own})
 
 
 @dataclass(kw_only=True, slots=True)

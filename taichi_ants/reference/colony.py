@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -10,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from taichi_ants.features import COLONY, refuse_unsupported
+from taichi_ants.features.support import COLONY, refuse_unsupported
 from taichi_ants.grid.constants import (
     N_HEADINGS,
     STREAM_ANT,
@@ -25,11 +24,8 @@ from taichi_ants.reference.castes import (
     caste_of,
     castes_at_start,
     draw_caste,
-    draw_threshold,
     draw_trait,
     epsilon_of,
-    starts_foraging,
-    stops_foraging,
 )
 from taichi_ants.reference.choice import (
     choose_action,
@@ -37,6 +33,7 @@ from taichi_ants.reference.choice import (
     misread_codes,
     slipped,
 )
+from taichi_ants.reference.features import hooks
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS, learn_together
@@ -184,11 +181,10 @@ class ReferenceColony:
             self.observe(ant)
 
     def add(self, ant: Ant) -> None:
-        """Put an ant into its slot and onto its cell, idle if it has a threshold."""
-        threshold = caste_of(self.task, ant).threshold
-        ant.threshold = draw_threshold(threshold, self.seed, ant.number)
+        """Put an ant into its slot and onto its cell."""
         ant.trait = draw_trait(self.seed, ant.number)
-        ant.idle = threshold.distribution != "none"
+        for born in hooks(self.task, "born"):
+            born(self, ant)
         self.ants[ant.slot] = ant
         self.world.ants[ant.cell] = ant
 
@@ -232,14 +228,11 @@ class ReferenceColony:
         assert not self.over
         tick = self.record.ticks
         acting = [self.ants[slot] for slot in sorted(self.ants)]
-        before = [copy.copy(ant) for ant in acting]
+        before = [ant.copy() for ant in acting]
         traffic = self.task.traffic
         intents = []
         for ant in acting:
-            if ant.idle:
-                stimulus = self.world.stimuli[ant.nest]
-                ant.idle = not starts_foraging(ant, stimulus, self.task.labour)
-            if ant.idle:
+            if self._any("choose", ant):
                 ant.action = -1
                 intents.append(Intent(ant, GIVE, rests=True))
                 continue
@@ -263,12 +256,9 @@ class ReferenceColony:
         self.record.regrown += self.food_sources.regrow(self.world, delays, tick)
         if life.pile_move_interval is not None and (tick + 1) % life.pile_move_interval == 0:
             self.food_sources.move_piles(self.world, self.queen_stream)
-        foragers = [pair for pair in zip(before, acting, strict=True) if not pair[1].idle]
-        stopping = {
-            ant.slot
-            for _, ant in foragers
-            if stops_foraging(ant, self.world.queens[ant.nest], self.task)
-        }
+        pairs = zip(before, acting, intents, strict=True)
+        foragers = [(was, ant) for was, ant, intent in pairs if not intent.rests]
+        stopping = {ant.slot for _, ant in foragers if self._any("acted", ant)}
         for ant in [*self.ants.values(), *dying]:
             self.observe(ant)
         if self.task.own_reward is not None:
@@ -280,12 +270,20 @@ class ReferenceColony:
         self._learn(foragers, stopping, last or self.over)
         for _, ant in foragers:
             if ant.slot in stopping:
-                ant.idle, ant.chosen = True, None
+                ant.chosen = None
+                for stopped in hooks(self.task, "stopped"):
+                    stopped(self, ant)
                 if self.sharing == "independent":
                     self.learners[ant.slot].begin()
         for nest in range(len(self.stores)):
-            self.world.stimuli[nest] += self.task.labour.demand or 0.0
+            for tick_ended in hooks(self.task, "tick_ended"):
+                tick_ended(self, nest)
         self.record.ticks += 1
+
+    def _any(self, point: str, ant: Ant) -> bool:
+        """Return whether a hook of a point returns true for an ant; all hooks run."""
+        results = [hook(self, ant) for hook in hooks(self.task, point)]
+        return any(results)
 
     def _draw_action(self, ant: Ant, tick: int) -> int:
         caste, choice = caste_of(self.task, ant), self.task.choice
@@ -318,8 +316,8 @@ class ReferenceColony:
         if record.deliveries and record.first_delivery < 0:
             record.first_delivery = record.ticks + 1
         for nest, n in enumerate(fed):
-            relief = (task.labour.relief or 0.0) * n
-            self.world.stimuli[nest] = max(0.0, self.world.stimuli[nest] - relief)
+            for delivered in hooks(task, "delivered"):
+                delivered(self, nest, n)
             self.stores[nest] += n * task.life.births
 
     def _births(self, nest: int) -> None:

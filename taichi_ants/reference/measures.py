@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.colony import ReferenceColony
+from taichi_ants.reference.features import TWINS
 from taichi_ants.reference.geometry import Cell, distance, listed_cells, neighbour
 from taichi_ants.task.constants import OBSTACLE
 from taichi_ants.task.events import Event
@@ -116,8 +117,12 @@ MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
     "activity": mean_of_ants(lambda _, ant: ant.event in (Event.ENTERED_EMPTY, Event.ENTERED_CUE)),
     "living": lambda colony: len(colony.ants),
     "carriers": mean_of_ants(lambda _, ant: ant.carries),
-    "foraging": mean_of_ants(lambda _, ant: not ant.idle),
     "distance": mean_of_ants(steps_to_queen),
+    **{
+        name: mean_of_ants(of_ant)
+        for twin in TWINS.values()
+        for name, of_ant in getattr(twin, "MEASURES", {}).items()
+    },
 }
 
 

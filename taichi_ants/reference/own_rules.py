@@ -10,6 +10,7 @@ import numpy as np
 
 from taichi_ants.errors import check_one_of
 from taichi_ants.reference.ants import Ant
+from taichi_ants.reference.features import inputs_of
 from taichi_ants.reference.geometry import distance
 from taichi_ants.reference.observations import (
     AHEAD,
@@ -67,7 +68,7 @@ def choose_by_rule(
         "random": low / _WORDS,
         "random_2": high / _WORDS,
     }
-    return int(computed(rule, task, {**inputs, **_of_ant(world, ant, tick, ant.misread)}))
+    return int(computed(rule, task, {**inputs, **_of_ant(world, ant, task, tick, ant.misread)}))
 
 
 def pay(world: WorldState, was: Ant, ant: Ant, rule: Rule, task: Task, tick: int) -> int:
@@ -78,15 +79,15 @@ def pay(world: WorldState, was: Ant, ant: Ant, rule: Rule, task: Task, tick: int
         "paper_state": was.paper_state,
         "next_paper_state": ant.paper_state,
     }
-    return int(computed(rule, task, {**inputs, **_of_ant(world, ant, tick, ())}))
+    return int(computed(rule, task, {**inputs, **_of_ant(world, ant, task, tick, ())}))
 
 
-def _of_ant(world: WorldState, ant: Ant, tick: int, hidden: Container[int]) -> dict[str, Any]:
+def _of_ant(
+    world: WorldState, ant: Ant, task: Task, tick: int, hidden: Container[int]
+) -> dict[str, Any]:
     """Return the inputs of all kinds of rules that ants follow; `hidden` turns show no levels."""
-    inputs: dict[str, Any] = {
-        name: getattr(ant, name) for name in ("carries", "trait", "threshold")
-    }
-    inputs |= {"stimulus": world.stimuli[ant.nest], "tick": tick}
+    inputs: dict[str, Any] = {"carries": ant.carries, "trait": ant.trait, "tick": tick}
+    inputs |= inputs_of(world, ant, task)
     named = {f"_{name}": trail for name, trail in world.pheromones.items()}
     for name, trail in {"": world.cue(ant), **named}.items():
         inputs[f"levels{name}"] = levels_in_view(world, ant, trail, AHEAD, hidden)

@@ -61,21 +61,26 @@ class Trail:
         self._levels[cell] = self._kind(level)
 
     def deposit(
-        self, cell: Cell, ant: Ant, tick: int, others: Mapping[str, Trail], stimulus: float
+        self,
+        cell: Cell,
+        ant: Ant,
+        tick: int,
+        others: Mapping[str, Trail],
+        inputs: Mapping[str, Any],
     ) -> None:
         """Deposit the pheromone of an ant that has had its load for `ant.carried` ticks.
 
         The ant has the load and the event after its action, and the paper's state before it.
-        `others` are all pheromones by name, `stimulus` is that of the ant's nest.
+        `others` are all pheromones by name, `inputs` those of features of the model for your rules.
         """
         rule, level = self.rule, self._levels[cell]
         if rule.own_deposit is not None:
             facts: dict[str, Any] = {
                 f"level_{name}": trail.level(cell) for name, trail in others.items()
             }
-            for name in ("carried", "carries", "event", "paper_state", "trait", "threshold"):
+            for name in ("carried", "carries", "event", "paper_state", "trait"):
                 facts[name] = getattr(ant, name)
-            facts |= {"level": level, "tick": tick, "stimulus": stimulus}
+            facts |= {"level": level, "tick": tick, **inputs}
             level = self._computed(rule.own_deposit, facts)
             level = level if rule.dense else math.floor(level)
         elif rule.deposit == "set":
@@ -122,13 +127,13 @@ class WorldState:
         pheromones: The trail and the further fields, by name.
         cues: The names of the outbound and the homing cue, by caste.
         foods: The kinds of food of the task; none for the usual food.
-        stimuli: Those of the nests, to which idle ants respond.
+        of_nests: The values of the features of the model by name, for each nest.
     """
 
     def __init__(self, world: World, task: Task, learns: bool = False) -> None:
         self._ranges = world.ranges
         self.queens: list[Cell] = queens_of(world)
-        self.stimuli = [0.0] * len(self.queens)
+        self.of_nests: list[dict[str, Any]] = [{} for _ in self.queens]
         self.ants: dict[Cell, Ant] = {}
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(world.ranges), EMPTY)
         self.ground |= dict.fromkeys(self.queens, QUEEN)

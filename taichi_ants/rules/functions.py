@@ -1,7 +1,7 @@
 """Functions that rules may call, in Python; kernels use their Taichi versions.
 
 The formulas, and the order of their operations, are those of the docstring of
-`taichi_ants.task.rules.numbers`. The built-in functions `min`, `max` and `abs` are also allowed.
+`taichi_ants.arithmetic.numbers`. The built-in functions `min`, `max` and `abs` are also allowed.
 """
 
 from __future__ import annotations

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from taichi_ants.features import INPUTS
+from taichi_ants.features.feature import Input
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -12,13 +15,6 @@ AHEAD = 3  # entries of an input with a value for each cell ahead: left, forward
 LEVELS, LEVEL = "levels_", "level_"  # the beginnings of inputs that read a field
 MOST_LEVEL = 1_000_000_000
 MOST_REWARD = 1000
-
-
-class Input(NamedTuple):
-    """An input: its meaning, and its number of entries if it is a vector, else 0."""
-
-    meaning: str
-    length: int = 0
 
 
 class RuleKind(NamedTuple):
@@ -34,11 +30,9 @@ class RuleKind(NamedTuple):
 
 _CODES = "codes seen: 0 E, 1 O, 2 T or S, 3 F or Q; see the glossary"
 _CUE = "the ant's cue: the pheromone that an ant with its load follows"
-LABOUR = ("threshold", "stimulus")  # inputs that need `Task.labour`
 _OF_ANTS = {  # of all kinds of rules that ants follow
     "trait": Input("number of the ant from 0 to less than 1, which never changes"),
-    "threshold": Input("response threshold of the ant, 0 without one; needs `task.labour`"),
-    "stimulus": Input("stimulus of the ant's nest; needs `task.labour`"),
+    **{name: read for name, (read, _) in INPUTS.items()},  # of features
     "tick": Input("number of the tick in the episode, from 0"),
 }
 KINDS: dict[str, RuleKind] = {

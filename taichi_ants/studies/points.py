@@ -17,7 +17,7 @@ import numpy as np
 
 from taichi_ants import PHYSICS, __version__, arguments, files, learners, measures, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
-from taichi_ants.features import COLONY
+from taichi_ants.features.support import COLONY
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import Recorder

@@ -17,7 +17,7 @@ import numpy as np
 
 from taichi_ants import arguments
 from taichi_ants.errors import AntsError, count, shown
-from taichi_ants.features import COLONY, LONE
+from taichi_ants.features.support import COLONY, LONE
 from taichi_ants.studies.executors import completed
 from taichi_ants.studies.plugins import Code
 from taichi_ants.studies.points import (

@@ -1,84 +1,22 @@
-"""Castes of ants, their response thresholds, and the division of a nest's ants into castes."""
+"""Castes of ants, and the division of a nest's ants into castes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from numbers import Real
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any
 
-from taichi_ants.errors import AntsError, is_flag
+from taichi_ants.errors import AntsError
+from taichi_ants.features import FEATURES
+from taichi_ants.features.labour import Threshold
 from taichi_ants.settings import Setting, Settings
 from taichi_ants.task.choice import Attraction, Exponent, Temperature
 from taichi_ants.task.constants import MAX_CASTES, MAX_NESTS
 from taichi_ants.task.food import Ticks
-from taichi_ants.task.labour import Stimulus
 
-Distribution = Literal["none", "fixed", "uniform", "normal", "lognormal"]
-DISTRIBUTIONS: tuple[str, ...] = get_args(Distribution)
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
 Rate = Annotated[float | None, Setting(least=0, most=1)]
 Number = Annotated[int | None, Setting(least=0)]
-
-
-@dataclass(frozen=True)
-class Threshold(Settings, path="task.castes.NAME.threshold"):
-    """The distribution of the response thresholds of a caste; by default, it has none.
-
-    - "fixed": all ants have the threshold `value`.
-    - "uniform": thresholds lie between `value` - `spread` and `value` + `spread`.
-    - "normal": `value` is the mean and `spread` the standard deviation. Values below 0 are drawn
-      again.
-    - "lognormal": `value` is the median and `spread` the standard deviation of the logarithm.
-    """
-
-    distribution: Annotated[
-        Distribution,
-        Setting(
-            "distribution of thresholds over the ants of the caste; with none, they always forage"
-        ),
-    ] = "none"
-    value: Annotated[
-        Stimulus,
-        Setting("threshold, or the middle of its distribution", unit="units of stimulus"),
-        Setting(usual=10.0, only=("distribution", *DISTRIBUTIONS[1:])),
-    ] = None
-    spread: Annotated[
-        Stimulus,
-        Setting("width of the distribution: half the range, or a standard deviation", usual=1.0),
-        Setting(only=("distribution", *DISTRIBUTIONS[2:])),
-    ] = None
-
-    def _faults(self) -> Iterator[str]:
-        value, spread = self.value or 0.0, self.spread or 0.0
-        if self.distribution == "uniform" and spread > value:
-            yield (
-                f"`{self.path}.spread` is {spread}; it must be at most the value, {value}, because "
-                "thresholds cannot be negative."
-            )
-        if self.distribution == "lognormal" and spread > 20:
-            yield f"`{self.path}.spread` is {spread}; it must be between 0 and 20 for 'lognormal'."
-
-    @classmethod
-    def converted(cls, value: Any) -> Any:
-        """Return the threshold that a number or the name of a distribution stands for."""
-        is_number = isinstance(value, Real) and not is_flag(value)
-        return cls("fixed", value) if is_number else super().converted(value)
-
-    @classmethod
-    def named(cls) -> Mapping[str, Threshold]:
-        """Return the named values, one for each distribution."""
-        return {name: cls(name) for name in DISTRIBUTIONS}  # type: ignore[arg-type]
-
-    @property
-    def exists(self) -> bool:
-        """Whether the ants have a threshold."""
-        return self.distribution != "none"
-
-    @property
-    def numbers(self) -> tuple[float, float, float]:
-        """The number of the distribution, `value` and `spread`, as kernels read them."""
-        return DISTRIBUTIONS.index(self.distribution), self.value or 0.0, self.spread or 0.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -151,8 +89,9 @@ class Caste(Settings, path="task.castes.NAME"):
     @property
     def fixed(self) -> tuple[Any, ...]:
         """The settings that cannot change in an episode."""
+        of_features = (of(self) for feature in FEATURES for of in feature.fixed.values())
         varies = bool(self.epsilon_spread)
-        return self.share, self.ants, self.nest, self.policy, self.threshold.exists, varies
+        return self.share, self.ants, self.nest, self.policy, varies, *of_features
 
     def pheromones_laid(self, names: Sequence[str]) -> list[str]:
         """Return the pheromones that the ants lay, of those with these names."""

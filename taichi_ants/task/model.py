@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from taichi_ants.features import used_by
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.task import Task
@@ -50,7 +51,7 @@ class Model:
         self.observation, self.traffic = task.sees, task.traffic
         self.slips, self.misreads = task.noise.slip > 0, task.noise.misread > 0
         self.ants_change, self.food_changes = task.ants_change, task.food_changes
-        self.has_labour = task.labour.divides
+        self.features = used_by(task)
         self.has_foods, self.has_loads = bool(task.foods), task.has_loads
         self.n_nests, self.n_kinds = n_nests, max(1, len(task.foods))
         self.n_castes = len(task.castes)  # 0: ants have no castes
@@ -102,7 +103,9 @@ class Model:
         self.field_names = (TRAIL, *task.fields) if self.rules else ()
         # Whether pheromones are laid one after the other, because rules of deposits read others.
         self.lays_in_turn = any(rule.kind == "deposit" and rule.fields for rule in self.rules)
-        self.reads_stimulus = any("stimulus" in rule.inputs for rule in self.rules)
+        inputs = {name for rule in self.rules for name in rule.inputs}
+        # Whether a rule reads what changes with the deliveries of a tick before ants observe.
+        self.reads_deliveries = any(inputs & feature.by_deliveries for feature in self.features)
 
     def _cues(self, outbound: int, homing: int, carriers_follow: int) -> Cues:
         half = self.views[outbound] == "half"

@@ -10,7 +10,8 @@ from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from taichi_ants.errors import shown
-from taichi_ants.rules.inputs import LABOUR
+from taichi_ants.features import FEATURES, feature_of_input
+from taichi_ants.features.labour import Labour
 from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import Parameters, Rule
 from taichi_ants.settings import Named, Setting, Settings, declared
@@ -19,7 +20,6 @@ from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
 from taichi_ants.task.choice import Choice, Noise
 from taichi_ants.task.field import COMPASS, TRAIL, Field
 from taichi_ants.task.food import Food, Ticks
-from taichi_ants.task.labour import Labour
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
@@ -185,7 +185,7 @@ class Task(Settings, path="task"):
         object.__setattr__(self, "rules", Named({**used, **others}))
 
     def _faults(self) -> Iterator[str]:
-        choice, life, labour = self.choice, self.life, self.labour
+        choice, life = self.choice, self.life
         without_states = choice.rule == "deneubourg" or (choice.own_rule and self.noise.misread)
         if without_states and self.observation != "paper":
             yield (
@@ -222,22 +222,14 @@ class Task(Settings, path="task"):
                 f"`task.life.pile_move_interval` is {life.pile_move_interval}; only food of one "
                 "kind with one load in a cell can wander, so leave it out."
             )
-        if labour.divides and not any(caste.threshold.exists for caste in self.castes.values()):
-            yield (
-                f"`task.labour.rule` is {labour.rule!r}, but ants have no thresholds; add a caste "
-                "with a `threshold` to `task.castes`."
-            )
+        for feature in FEATURES:
+            yield from feature.faults(self)
         nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
         for nest in (nests or {0}) if self.castes else ():
             shares_in(self.castes, nest)  # raises AntsError
         unused = [] if choice.needs_table else [*_OF_TABLES]
         unused += [name for name, rules in _OF_CHOICE.items() if choice.rule not in rules]
         for name, caste in self.castes.items():
-            if caste.threshold.exists and not labour.divides:
-                yield (
-                    f"`task.castes.{name}.threshold` is {caste.threshold.distribution!r}; leave it "
-                    "out unless `task.labour.rule` is 'thresholds'."
-                )
             for setting in unused:
                 if getattr(caste, setting) is not None:
                     yield (
@@ -251,11 +243,14 @@ class Task(Settings, path="task"):
                     f"`task.rules` has parameters of {name!r}, a rule that the task does not use; "
                     "leave them out, or name the rule, for example in `task.choice.rule`."
                 )
-            needs = [read for read in LABOUR if name in rules and read in rules[name].inputs]
-            if needs and not labour.divides:
-                yield (
-                    f"the rule {name!r} reads `{needs[0]}`; set `task.labour.rule` to 'thresholds'."
-                )
+            for read in rules[name].inputs if name in rules else ():
+                owner = feature_of_input(read)
+                if owner is not None and not owner.is_used(self):
+                    example = owner.example[owner.name]
+                    yield (
+                        f"the rule {name!r} reads `{read}`; set `task.{owner.name}`, for example "
+                        f"to {example!r}."
+                    )
 
     def _names_of_fields(self) -> Iterator[tuple[Any, ...]]:
         """Yield each name of a pheromone in the settings, after what it is, with further words."""

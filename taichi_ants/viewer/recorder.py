@@ -15,6 +15,7 @@ from taichi_ants import learners
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.results import Trace
 from taichi_ants.errors import AntsError, check_one_of, count, expect
+from taichi_ants.features.labour import LABOUR
 from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
@@ -132,7 +133,7 @@ class Recorder:
             "events": [event.name for event in Event],
             "castes": list(task.castes),
             "foods": list(task.foods),
-            "idles": task.labour.divides,
+            "idles": LABOUR.is_used(task),
             "rule": task.choice.rule,
             "values": colony.has_training,  # whether ants choose by action values
             # The view of the pheromone, "" if an ant may know more or less than its letters say.

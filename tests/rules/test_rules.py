@@ -280,7 +280,7 @@ def test_a_rule_that_differs_from_its_twin_is_refused(clean):
 
 
 def test_rules_that_read_labour_or_fields_need_them(clean):
-    message = r"^the rule 'hungry' reads `threshold`; set `task\.labour\.rule` to 'thresholds'\.$"
+    message = r"^the rule 'hungry' reads `threshold`; set `task\.labour`, for example to 'thresh"
     with pytest.raises(AntsError, match=message):
         Task(choice="hungry")
     castes, labour = {"one": {"threshold": 1.0}}, "thresholds"

@@ -138,7 +138,7 @@ def assert_ants_equal(colony: Colony, plain: ReferenceColony) -> None:
         (colony.paper_states, [ant.paper_state for ant in ants]),
         (colony.states, [ant.state for ant in ants]),
         (colony.actions, [ant.action for ant in ants]),
-        (colony.idle, [ant.idle for ant in ants]),
+        (colony.idle, [ant.own.get("idle", False) for ant in ants]),
         (colony.streams, [ant.stream.state for ant in ants]),
     ):
         assert column[0, slots].tolist() == of_ant
@@ -176,7 +176,7 @@ def steps_compared(
             seen["births"] += record.births
             seen["deaths"] += record.deaths
             seen["later nests"] += sum(n for (nest, _), n in record.delivered.items() if nest)
-            seen["idle"] += sum(ant.idle for ant in plain.ants.values())
+            seen["idle"] += sum(ant.own.get("idle", False) for ant in plain.ants.values())
             seen["castes"] += len({ant.caste for ant in plain.ants.values()}) > 1
     except AntsError:
         seen["refused"] += 1

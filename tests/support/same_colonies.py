@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from taichi_ants import Colony, World
+from taichi_ants import Colony, World, features
 from taichi_ants.engines.colony.layout import FoodSourceRow, NestRow, WorldRow
+from taichi_ants.features.feature import ANT, NEST
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import FOOD
 
@@ -45,10 +46,13 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     if colony.model.ants_change:
         assert mine["age"] == [ant.age for ant in theirs]
     assert mine["streams"] == [ant.stream.state for ant in theirs]
-    for name in ("state", "nest", "caste", "idle", "threshold"):
-        column = getattr(colony, f"{name}s" if name != "idle" else name)[world, slots]
-        expected = np.array([getattr(ant, name) for ant in theirs], column.dtype)
-        assert np.array_equal(column, expected), name
+    for name in ("state", "nest", "caste"):
+        column = getattr(colony, f"{name}s")[world, slots]
+        assert column.tolist() == [getattr(ant, name) for ant in theirs], name
+    for _, array in features.arrays(ANT):
+        column = getattr(colony, array.view)[world, slots]
+        expected = np.array([ant.own.get(array.name, 0) for ant in theirs], column.dtype)
+        assert np.array_equal(column, expected), array.name
     executed, rewards = colony.executed[world, slots], colony.rewards[world, slots]
     for action, reward, ant in zip(executed.tolist(), rewards.tolist(), theirs, strict=True):
         assert ant.action < 0 or (action, reward) == (ant.executed, ant.reward)
@@ -92,7 +96,9 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     assert {(int(n), int(k)): int(apart[n, k]) for n, k in np.argwhere(apart)} == record.delivered
     by_caste = dict(enumerate(outcome.caste_deliveries[0, world].tolist()))
     assert {caste: n for caste, n in by_caste.items() if n} == record.by_caste
-    assert colony.stimuli[world].tolist() == plain.world.stimuli
+    for _, array in features.arrays(NEST):
+        of_nests = [values.get(array.name, 0.0) for values in plain.world.of_nests]
+        assert getattr(colony, array.view)[world].tolist() == of_nests, array.name
     first = world * colony.n_food_sources
     food_sources = colony.arrays["food_sources"][:, first : first + row[WorldRow.FOOD_SOURCES]]
     theirs = plain.food_sources.food_sources[: food_sources.shape[1]]

@@ -32,7 +32,7 @@ POWERS = np.where(RNG.random(30_000) < 0.3, RNG.integers(0, 21, 30_000), RNG.uni
 def kernels():
     """The functions over arrays."""
     runtime.start()
-    from taichi_ants.task.rules.numbers import exponential, logarithm, power
+    from taichi_ants.arithmetic.numbers import exponential, logarithm, power
 
     array = ti.types.ndarray(dtype=ti.f64, ndim=1)
 

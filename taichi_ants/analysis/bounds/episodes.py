@@ -17,7 +17,7 @@ import numpy as np
 
 from taichi_ants.analysis.bounds.surroundings import Surroundings, in_view, look_around
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.features import LONE, refuse_unsupported
+from taichi_ants.features.support import LONE, refuse_unsupported
 from taichi_ants.task import Rewards, Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, PICK_UP
 from taichi_ants.worlds.world import World

@@ -22,14 +22,14 @@ import numpy as np
 
 from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
 from taichi_ants.arguments import checked_task, checked_world
-from taichi_ants.features import CASTES, COLONY, FOODS
+from taichi_ants.features.support import BASE, CASTES, FOODS
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds.world import World
 
 SUPPORTS = (
-    COLONY - CASTES - FOODS - {"nests", "life.births", "life.lifespan", "life.pile_move_interval"}
+    BASE - CASTES - FOODS - {"nests", "life.births", "life.lifespan", "life.pile_move_interval"}
 )
 
 

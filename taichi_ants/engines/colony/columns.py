@@ -2,8 +2,8 @@
 
 import taichi as ti
 
+from taichi_ants.arithmetic.random_bits import advance, bits_of, high_word, stream_of
 from taichi_ants.grid.constants import STREAM_INDIVIDUAL
-from taichi_ants.task.rules.random_bits import advance, bits_of, high_word, stream_of
 
 
 @ti.func

@@ -24,6 +24,8 @@ from taichi_ants.engines.colony.layout import (
     WorldRow,
     array_of,
 )
+from taichi_ants.engines.colony.views import names_of
+from taichi_ants.features.points import POINTS
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
@@ -50,6 +52,13 @@ class Variant:
         vars(self).update(vars(model))
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if model.traffic.shared else 0
+        # The hooks of features at each point, in their order.
+        self.at = {
+            point: [feature.hooks[point] for feature in model.features if point in feature.hooks]
+            for point in POINTS
+        }
+        self.can_rest = bool(self.at["rests"])
+        self.names = names_of(model)
         own = own_inputs.own_rules(model.rules)
         self.own_choice = model.choice_rule and own[model.choice_rule].choose
         self.own_reward = model.reward_rule and own[model.reward_rule].pay
@@ -111,7 +120,7 @@ def tick_phases(v: Variant) -> Iterator[Phase]:
         yield Phase(CELLS, trail.evaporate)
         yield Phase(CELLS, trail.diffuse)
         yield Phase(CELLS, trail.apply_diffusion)
-    if v.ants_change or v.food_changes or v.reads_stimulus:
+    if v.ants_change or v.food_changes or v.reads_deliveries:
         yield Phase(WORLD, life.count)
     if v.ants_change:
         yield Phase(WORLD, life.give_birth)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum, auto
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from taichi_ants.features import arrays
+from taichi_ants.features.feature import ANT, Feature
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
 from taichi_ants.task.model import Model
 
@@ -18,6 +21,10 @@ class Column(NamedTuple):
     dtype: type
     start: int = 0
     is_used: Callable[[Model], bool] = lambda model: True
+
+
+def _uses(feature: Feature, model: Model) -> bool:
+    return feature in model.features
 
 
 # Small values that each tick uses take one byte, which is a quarter of the memory traffic.
@@ -48,8 +55,10 @@ COLUMNS = {
     # The kind of the last food that it picked up.
     "kind": Column(np.int8, 0, lambda model: model.n_kinds > 1),
     "caste": Column(np.int8, 0, lambda model: model.n_castes > 0),
-    "idle": Column(np.int8, 0, lambda model: model.has_labour),  # 1 if it does not forage
-    "threshold": Column(np.float32, 0, lambda model: model.has_labour),  # of its response
+    **{
+        array.name: Column(np.dtype(array.dtype).type, 0, partial(_uses, feature))
+        for feature, array in arrays(ANT)
+    },
 }
 
 
@@ -132,7 +141,7 @@ GAVE_UP = -(2**40)  # added to OPENED when the first part gives up, which keeps 
 
 
 class CasteRow(IntEnum):
-    """Rows of `castes`, one column for each caste; see `Caste`."""
+    """The first rows of `castes`, one column for each caste; numbers of features follow."""
 
     EPSILON = 0  # -1 if it has that of the colony
     EPSILON_SPREAD = auto()
@@ -145,10 +154,6 @@ class CasteRow(IntEnum):
     LAYS = auto()  # a bit for each pheromone
     CUES = auto()  # the number of its cues in `Task.all_cues`
     LIFESPAN = auto()  # -1 if it does not die
-    STOP_PROBABILITY = auto()  # 0 without a threshold
-    DISTRIBUTION = auto()  # of thresholds, a number in `DISTRIBUTIONS`
-    VALUE = auto()
-    SPREAD = auto()
 
 
 class FoodRow(IntEnum):

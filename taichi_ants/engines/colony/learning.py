@@ -8,15 +8,16 @@ would move it. Each chunk of ants has its own sums, without atomic operations.
 
 import taichi as ti
 
-from taichi_ants.engines.colony import columns, labour, steps
+from taichi_ants.arithmetic.random_bits import advance, draw_below
+from taichi_ants.engines.colony import columns, steps
 from taichi_ants.engines.colony.layout import CasteRow, Stage, SumRow, Tally
+from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.learners import model
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
 from taichi_ants.task.constants import BEST_AT, N_ACTIONS, ROW
 from taichi_ants.task.events import Event
 from taichi_ants.task.rules.delivery import step_end, terminates
 from taichi_ants.task.rules.policy import best_actions
-from taichi_ants.task.rules.random_bits import advance, draw_below
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
 
@@ -47,8 +48,8 @@ def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         else:
             see_anew(c, v, w, ant, 0)
         begin_to_learn(c, v, ant)
-        if ti.static(v.has_labour):
-            labour.begin(c, v, w, ant)
+        for born in ti.static(v.at["born"]):
+            born(ant_view(c, v, w, ant))
 
 
 @ti.func
@@ -58,8 +59,8 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         columns.put(c.stage, ant, Stage.LIVING)
         if ti.static(v.independent):
             reset_slot(c, v, ant)
-        if ti.static(v.has_labour):
-            labour.begin(c, v, w, ant)
+        for born in ti.static(v.at["born"]):
+            born(ant_view(c, v, w, ant))
     see_anew(c, v, w, ant, tick)
 
 
@@ -70,10 +71,11 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if ti.static(v.ants_change):  # else no ant is born within a tick
         lives = columns.trait(c.stage, ant) != Stage.NEWBORN
     acts, stops = lives, False
-    if ti.static(v.has_labour):
-        acts = acts & (columns.trait(c.idle, ant) == 0)
+    for rests in ti.static(v.at["rests"]):
+        acts = acts & (rests(ant_view(c, v, w, ant)) == 0)
+    for acted in ti.static(v.at["acted"]):
         if acts:
-            stops = labour.stops(c, v, w, ant)
+            stops = stops | acted(ant_view(c, v, w, ant))
     paper_state, state = steps.observe(c, v, w, ant, tick + 1)
     next_action = -1
     if ti.static(v.has_own_reward):
@@ -95,9 +97,9 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if lives:
         c.wants[marked] = 0
     note_seen(c, v, ant, paper_state, state)
-    if ti.static(v.has_labour):
+    if ti.static(v.can_rest):
         next_action = ti.select(stops, -1, next_action)
-        make_idle(c, v, ant, acts, stops)
+        rest(c, v, w, ant, acts, stops)
     if ti.static(v.draws_next_action):
         columns.put(c.next_action, ant, next_action)
 
@@ -112,14 +114,15 @@ def learns(c: ti.template(), v: ti.template(), ant):
 
 
 @ti.func
-def make_idle(c: ti.template(), v: ti.template(), ant, acts, stops):
-    """Make a forager idle if it `stops`; an ant without an action has the last action -1."""
+def rest(c: ti.template(), v: ti.template(), w, ant, acts, stops):
+    """Let an ant begin to rest if it `stops`; one without an action has the last action -1."""
     if not acts:
         columns.put(c.action, ant, -1)
         if ti.static(v.slips):
             columns.put(c.executed, ant, -1)
     if stops:
-        columns.put(c.idle, ant, 1)
+        for stopped in ti.static(v.at["stopped"]):
+            stopped(ant_view(c, v, w, ant))
         begin_to_learn(c, v, ant)
 
 
@@ -387,7 +390,7 @@ def weight_of(c: ti.template(), v: ti.template(), pair, count):
 def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Draw a visited pair for a planning update of an ant."""
     acted = columns.trait(c.stage, ant) != Stage.NEWBORN
-    if ti.static(v.has_labour):
+    if ti.static(v.can_rest):
         acted = acted & (columns.trait(c.event, ant) != Event.NONE)
     if acted & learns(c, v, ant):
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))

@@ -7,7 +7,7 @@ world serially, because they have little to do in a tick.
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.engines.colony import labour
+from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below, high_word, stream_of
 from taichi_ants.engines.colony.columns import of_caste, put, trait
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
@@ -25,11 +25,11 @@ from taichi_ants.engines.colony.layout import (
 )
 from taichi_ants.engines.colony.learning import reset_slot
 from taichi_ants.engines.colony.steps import tally
+from taichi_ants.engines.colony.views import ant_view, nest_view
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
 from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, OBSTACLE, QUEEN
 from taichi_ants.task.events import Event
 from taichi_ants.task.rules.policy import bit_number
-from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below, high_word, stream_of
 
 
 @ti.func
@@ -53,8 +53,8 @@ def count(c: ti.template(), v: ti.template(), w, tick):
         count_by_nest(c, v, w)
     else:
         c.nests[NestRow.STORE, w] = c.nests[NestRow.STORE, w] + gives * c.births
-        if ti.static(v.has_labour):
-            labour.relieve(c, w, gives)
+        for delivered in ti.static(v.at["delivered"]):
+            delivered(nest_view(c, v, w, 0), gives)
     if ti.static(v.n_castes > 0):
         count_by_caste(c, v, w)
     if gives > 0 and c.worlds[WorldRow.FIRST_DELIVERY, w] < 0:
@@ -74,8 +74,8 @@ def count_by_nest(c: ti.template(), v: ti.template(), w):
             c.deliveries_by_nest_and_kind[column * v.n_kinds + kind] += n
             of_nest += n
         c.nests[NestRow.STORE, column] += of_nest * c.births
-        if ti.static(v.has_labour):  # once, since it rounds
-            labour.relieve(c, column, of_nest)
+        for delivered in ti.static(v.at["delivered"]):  # once, since it can round
+            delivered(nest_view(c, v, w, nest), of_nest)
 
 
 @ti.func
@@ -165,8 +165,8 @@ def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, headin
     if ti.static(v.n_nests > 1):
         put(c.nest, ant, nest)
         ground = OBSTACLE | (ANT_STANDS - nest) << 4
-    if ti.static(v.has_labour):
-        labour.begin(c, v, w, ant)
+    for born in ti.static(v.at["born"]):
+        born(ant_view(c, v, w, ant))
     c.ground[w * c.size + cell] = ti.cast(ground, ti.u8)
     c.worlds[WorldRow.NEXT_NUMBER, w] = number + 1
     c.worlds[WorldRow.LIVING, w] += 1
@@ -308,8 +308,9 @@ def update_slots(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 @ti.func
 def end_tick(c: ti.template(), v: ti.template(), w, tick):
     """Count the tick, and end the episode of a world at a delivery if `c.ends_at_delivery`."""
-    if ti.static(v.has_labour):
-        labour.demand(c, v, w)
+    for tick_ended in ti.static(v.at["tick_ended"]):
+        for nest in range(v.n_nests):
+            tick_ended(nest_view(c, v, w, nest))
     c.worlds[WorldRow.TICKS, w] = tick + 1
     if c.ends_at_delivery == 1 and c.worlds[WorldRow.DELIVERIES, w] > 0:
         c.worlds[WorldRow.RUNNING, w] = 0

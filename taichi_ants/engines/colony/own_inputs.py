@@ -13,7 +13,8 @@ from typing import Any
 
 import taichi as ti
 
-from taichi_ants.engines.colony.columns import individual, nest_of
+from taichi_ants.arithmetic.random_bits import high_word, low_word
+from taichi_ants.engines.colony.columns import individual
 from taichi_ants.engines.colony.steps import (
     cell_ahead,
     cue_level,
@@ -24,13 +25,14 @@ from taichi_ants.engines.colony.steps import (
     trait,
 )
 from taichi_ants.engines.colony.trail import level_of
+from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.engines.own_rules import bounded_function, for_kernels
+from taichi_ants.features import INPUTS
 from taichi_ants.learners.memory import values_of
 from taichi_ants.rules import Rule
 from taichi_ants.rules.inputs import AHEAD, LEVELS, field_of
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.rules.actions import step_towards
-from taichi_ants.task.rules.random_bits import high_word, low_word
 from taichi_ants.task.rules.vision import code_in_view
 
 _CODE, _IS_TRUE, _IS_OPEN, _NEARER = range(4)  # the results of `cell_ahead`
@@ -123,8 +125,7 @@ def _of_ants(c: Any, v: Any, w: Any, ant: Any, tick: Any) -> Make:
     """Return the inputs of all kinds of rules that ants follow."""
     return {
         "trait": lambda: individual(c, w, ant),
-        "threshold": lambda: _threshold(c, ant),
-        "stimulus": lambda: _stimulus(c, v, w, ant),
+        **{name: partial(read, ant_view(c, v, w, ant)) for name, (_, read) in INPUTS.items()},
         "tick": lambda: tick,
     }
 
@@ -154,18 +155,6 @@ def _of_levels(
 def _level(c: Any, v: Any, name: str, index: Any, tick: Any) -> Any:
     """Return the level of a cell in the pheromone that an input names."""
     return level_of(v.field(c, v.field_names.index(field_of(name))), index, tick)
-
-
-@ti.func
-def _threshold(c: ti.template(), ant):
-    """Return the response threshold of an ant, f32."""
-    return c.threshold[ant]
-
-
-@ti.func
-def _stimulus(c: ti.template(), v: ti.template(), w, ant):
-    """Return the stimulus of the nest of an ant, f64."""
-    return c.stimulus[w * v.n_nests + nest_of(c, v, ant)]
 
 
 @ti.func

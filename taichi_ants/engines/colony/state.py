@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, Literal, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -44,7 +44,9 @@ from taichi_ants.errors import (
     expect,
     shown,
 )
-from taichi_ants.features import CASTES, COLONY, refuse_unsupported
+from taichi_ants.features import arrays, numbers_of_castes, used_by
+from taichi_ants.features.feature import ANT, NEST, Array
+from taichi_ants.features.support import BASE, CASTES, COLONY, refuse_unsupported
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state, words_of
@@ -66,6 +68,7 @@ Sharing = Literal["shared", "independent", "frozen"]
 SHARINGS: tuple[str, ...] = get_args(Sharing)
 Arrays = dict[str, np.ndarray]
 Which = slice | np.ndarray
+OF_ANTS = tuple(array.view for _, array in arrays(ANT))  # views of arrays of features
 ALL = slice(None)  # selects all worlds; a bool (W,) selects some
 
 _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
@@ -93,6 +96,17 @@ def column(name: str, dtype: Any = None) -> property:
     return property(view)
 
 
+def of_nests(array: Array) -> property:
+    """Return a property: a copy (W, nests) of an array of a feature, 0 if it is not used."""
+
+    def view(state: ColonyState) -> np.ndarray:
+        shape = len(state.seeds), state.n_nests
+        stored = state.arrays.get(array.name, np.zeros(shape))
+        return stored.reshape(shape).astype(array.shown_as)
+
+    return property(view)
+
+
 class ColonyState:
     """The state of a colony of W worlds with `capacity` slots for ants each.
 
@@ -111,7 +125,14 @@ class ColonyState:
         ready: bool (W,), whether an episode has begun, and each change of it was completed.
         delivered: int64 (W,), food items delivered in previous episodes.
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
+
+    The arrays of features have views (W, capacity) or (W, nests) by their declared names, which are
+    copies, 0 in colonies without the feature.
     """
+
+    if TYPE_CHECKING:  # the views of arrays of features, see below
+
+        def __getattr__(self, name: str) -> np.ndarray: ...
 
     def __init__(
         self,
@@ -156,7 +177,7 @@ class ColonyState:
         if self.learns:
             arguments.check_learner(self.training, task, sharing)
         if self.is_given_actions:
-            refuse_unsupported("a colony with given actions", task.uses(), SUPPORTS - CASTES)
+            refuse_unsupported("a colony with given actions", task.uses(), BASE - CASTES)
         if policies and sharing == "independent":
             raise AntsError(
                 f"`task.castes.{policies[0]}.policy` is {task.castes[policies[0]].policy!r}, but "
@@ -248,10 +269,8 @@ class ColonyState:
     next_actions, streams = column("next_action"), column("streams")
     _stages, _loads, _states = column("stage"), column("carries"), column("state")
     _executed, _carried, _kinds = column("executed"), column("carried"), column("kind")
-    # Copies (W, capacity) of what the last ant in each slot is: the numbers of its nest and caste,
-    # int32; whether it is idle, see `Labour`, bool; its response threshold, float32.
+    # Copies (W, capacity) of the nest and the caste of the last ant in each slot, int32.
     nests, castes = column("nest", np.int32), column("caste", np.int32)
-    idle, thresholds = column("idle", bool), column("threshold", np.float32)
 
     @property
     def living(self) -> np.ndarray:
@@ -332,12 +351,6 @@ class ColonyState:
         return self.nests * np.int32(self.model.n_groups // self.n_nests) + self.castes
 
     @property
-    def stimuli(self) -> np.ndarray:
-        """The present stimulus of each nest, float64 (W, nests); 0 unless labour is divided."""
-        stimuli = self.arrays.get("stimulus", np.zeros(len(self.seeds) * self.n_nests))
-        return stimuli.reshape(len(self.seeds), -1).copy()
-
-    @property
     def rewards(self) -> np.ndarray:
         """The reward of the last action of the ant in each slot, int32 (W, capacity)."""
         if "reward" in self.arrays:
@@ -411,8 +424,7 @@ class ColonyState:
             food_kinds=of_cells,
             queens=queens.astype(np.int32),
             ant_castes=self.castes[world, living],
-            ant_idle=self.idle[world, living],
-            ant_thresholds=self.thresholds[world, living],
+            of_ants={view: getattr(self, view)[world, living] for view in OF_ANTS},
             fields=fields,
             counts=counts,
             world=self.worlds[world],
@@ -635,7 +647,11 @@ class ColonyState:
             "loads": loads.reshape(-1) if model.has_loads else np.zeros(1, np.int32),
             "deliveries_by_nest_and_kind": np.zeros(of_nests.shape[1] * self.n_kinds, np.int32),
             **(by_caste if model.n_castes else {}),
-            **({"stimulus": np.zeros(of_nests.shape[1])} if model.has_labour else {}),
+            **{
+                array.name: np.zeros(of_nests.shape[1])
+                for feature, array in arrays(NEST)
+                if feature in model.features
+            },
             # Sums over all ants in this episode, see `Tally`.
             "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
             **food_sources.arrays(foods, rows, n_food_sources, self.grid.size),
@@ -758,8 +774,10 @@ class ColonyState:
         """Return the settings of the task as kernels read them."""
         task, settings = self.task, {}
         rules = [value for rule in task.rules.values() for value in vars(rule).values()]
-        if task.labour.divides:
-            settings["labour"] = np.array(task.labour.numbers)
+        for feature in self.model.features:
+            if feature.numbers:
+                values = (getattr(feature.of(task), name) for name in feature.numbers)
+                settings[feature.name] = np.array([value or 0.0 for value in values])
         if task.castes:
             most = self.capacity if self.sharing == "shared" else 1
             rates = [caste.learning_rate or 0.0 for caste in task.castes.values()]
@@ -897,6 +915,12 @@ class ColonyState:
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
 
 
+for _, array in arrays(ANT):
+    setattr(ColonyState, array.view, column(array.name, np.dtype(array.shown_as)))
+for _, array in arrays(NEST):
+    setattr(ColonyState, array.view, of_nests(array))
+
+
 def _food_numbers(task: Task) -> np.ndarray:
     """Return the settings of the kinds of food, int32 (FoodRow, kinds)."""
     kinds = task.foods.values()
@@ -908,9 +932,9 @@ def _food_numbers(task: Task) -> np.ndarray:
 
 
 def _caste_numbers(task: Task, discount: float) -> np.ndarray:
-    """Return the numbers of the castes, float64 (CasteRow, castes)."""
-    pheromones, cues = (TRAIL, *task.fields), task.all_cues
-    numbers = np.zeros((len(CasteRow), len(task.castes)))
+    """Return the numbers of the castes, float64 (rows, castes); see `CasteRow`."""
+    pheromones, cues, own = (TRAIL, *task.fields), task.all_cues, numbers_of_castes(used_by(task))
+    numbers = np.zeros((len(CasteRow) + len(own), len(task.castes)))
     for k, caste in enumerate(task.castes.values()):
         numbers[:, k] = (
             _or(caste.epsilon, -1.0),
@@ -922,8 +946,7 @@ def _caste_numbers(task: Task, discount: float) -> np.ndarray:
             sum(1 << pheromones.index(name) for name in set(caste.pheromones_laid(pheromones))),
             cues.index(task.cues_of(caste)),
             _or(caste.lifespan, _or(task.life.lifespan, -1)),
-            _or(task.labour.stop_probability, 0.0) * caste.threshold.exists,
-            *caste.threshold.numbers,
+            *(of(task, caste) for of in own.values()),
         )
     return numbers
 

@@ -19,7 +19,7 @@ from typing import Any
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.engines.colony import labour
+from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below
 from taichi_ants.engines.colony.columns import group_of, individual, nest_of, of_caste, put, trait
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
@@ -41,6 +41,7 @@ from taichi_ants.engines.colony.trail import (
     level_that_counts,
     occasions_of,
 )
+from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.engines.views import fill_codes
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
@@ -80,7 +81,6 @@ from taichi_ants.task.rules.policy import (
     choose_softly,
     lowest_bit_number,
 )
-from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 
 
 @ti.func
@@ -489,18 +489,19 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         action = trait(c.action, ant)
     elif ti.static(v.draws_next_action):
         action = trait(c.next_action, ant)
-    idle = 0
-    if ti.static(v.has_labour):
-        idle, random_state = labour.stays_idle(c, v, w, ant, random_state)
+    resting = 0
+    for choose in ti.static(v.at["choose"]):
+        rests, random_state = choose(ant_view(c, v, w, ant), random_state)
+        resting |= rests
         # Without food, this action does nothing; `observe_and_learn` removes it.
-        action = ti.select(idle == 1, GIVE, action)
+        action = ti.select(resting == 1, GIVE, action)
     if action < 0:
         random_state = advance(random_state)
         state = state_index_of(c, v, ant)
         action = draw_action(c, v, w, ant, state, paper_state, tick, random_state)
     chosen = action
     if ti.static(v.slips):
-        if idle == 0:
+        if resting == 0:
             action, random_state = noise.slipped(action, random_state, c.slip_below)
     heading = turned_by(c.compass, trait(c.heading, ant), action)
     step = step_towards(c.compass, heading, FORWARD)
@@ -653,8 +654,8 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if ti.static(len(v.pheromones) > 1):
         age = ti.select(carries == had_food, age, 0)
         occasions = occasions_of(had_food, paper_state, action, event, goes != cell)
-        if ti.static(v.has_labour):
-            occasions *= 1 - trait(c.idle, ant)
+        for rests in ti.static(v.at["rests"]):
+            occasions *= 1 - rests(ant_view(c, v, w, ant))
         fields = ti.static([] if v.lays_in_turn else v.further_fields(c))
         for i in ti.static(range(len(fields))):
             if lays(c, v, ant, i + 1):
@@ -671,8 +672,8 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         ground = OBSTACLE | ((ANT_STANDS - nest_of(c, v, ant)) << 4) + (carries << 7)
     c.ground[base + goes] = ti.cast(ground, ti.u8)
     c.cell[ant] = goes
-    if ti.static(v.has_labour):
-        event = ti.select(trait(c.idle, ant) == 1, ti.cast(Event.NONE, ti.i32), event)
+    for rests in ti.static(v.at["rests"]):
+        event = ti.select(rests(ant_view(c, v, w, ant)) == 1, ti.cast(Event.NONE, ti.i32), event)
     put(c.event, ant, event)
     tally(c, Tally.MOVES, chunk, moves)
     tally(c, Tally.BLOCKED, chunk, moves & (1 - enters))
@@ -694,8 +695,8 @@ def lays_field(number: int) -> Callable[..., None]:
             had_food = 1
         age = ti.select(carries == had_food, c.carried[ant] - 1, 0)
         occasions = occasions_of(had_food, paper_state, executed_by(c, v, ant), event, goes != cell)
-        if ti.static(v.has_labour):
-            occasions *= 1 - trait(c.idle, ant)
+        for rests in ti.static(v.at["rests"]):
+            occasions *= 1 - rests(ant_view(c, v, w, ant))
         food = cell + c.compass[conflicts.heading_taken(c, w * c.size + cell) + 1]
         field = ti.static(v.field(c, number))
         laid = occasions & ti.static(int(OCCASIONS["with_food"]))

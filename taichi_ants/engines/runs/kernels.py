@@ -10,6 +10,7 @@ from typing import Any
 
 import taichi as ti
 
+from taichi_ants.arithmetic.random_bits import advance, bits_of
 from taichi_ants.engines.layout import (
     DELIVERIES,
     DISCOUNT,
@@ -31,7 +32,6 @@ from taichi_ants.task.events import Event
 from taichi_ants.task.rules.delivery import step_end
 from taichi_ants.task.rules.noise import slipped
 from taichi_ants.task.rules.policy import chance_of, chance_of_softly, choose, choose_softly
-from taichi_ants.task.rules.random_bits import advance, bits_of
 
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
 # indices are not negative.

@@ -12,6 +12,7 @@ from typing import Any
 
 import taichi as ti
 
+from taichi_ants.arithmetic.random_bits import advance, bits_of
 from taichi_ants.engines.layout import EXTRA_CELLS, TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.step import (
     Ant,
@@ -27,7 +28,6 @@ from taichi_ants.task.rules.delivery import step_end
 from taichi_ants.task.rules.noise import slipped
 from taichi_ants.task.rules.pheromone import FADING
 from taichi_ants.task.rules.policy import choose_from_masks
-from taichi_ants.task.rules.random_bits import advance, bits_of
 
 WIDTH, LENGTH = 512, 64
 # Codes between the steps of an ant: with a power of two, all of them would compete for the same

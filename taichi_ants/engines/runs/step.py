@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import taichi as ti
 from taichi.math import popcnt
 
+from taichi_ants.arithmetic.random_bits import draw_below
 from taichi_ants.engines.views import encode_function, fill_codes, view_type
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
@@ -26,7 +27,6 @@ from taichi_ants.task.rules.actions import (
 from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
 from taichi_ants.task.rules.pheromone import FADING, NONE, level_after_deposit, level_left
 from taichi_ants.task.rules.policy import bit_number, lowest_bit_number
-from taichi_ants.task.rules.random_bits import draw_below
 
 # An ant, and the event of its last action.
 Ant = ti.types.struct(

@@ -9,8 +9,8 @@ from typing import Any
 
 import taichi as ti
 
+from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word, low_word
 from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word, low_word
 from taichi_ants.task.rules.vision import code_in_view, state_index
 
 

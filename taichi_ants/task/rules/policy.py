@@ -9,10 +9,10 @@ f64, and sums are from the first weight to the last.
 import taichi as ti
 from taichi.math import popcnt
 
+from taichi_ants.arithmetic.numbers import exponential, power
+from taichi_ants.arithmetic.random_bits import below, high_word, low_word
 from taichi_ants.task.constants import GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT, SEES_GOAL
 from taichi_ants.task.rules.actions import bit_number_in
-from taichi_ants.task.rules.numbers import exponential, power
-from taichi_ants.task.rules.random_bits import below, high_word, low_word
 
 
 @ti.func

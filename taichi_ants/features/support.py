@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from taichi_ants.errors import AntsError
+from taichi_ants.features import FEATURES
 
 # Of a lone ant. A group, such as `rewards`, stands for all of its settings.
 LONE = frozenset(
@@ -25,13 +26,13 @@ CHOICE = frozenset({"choice.rule", "choice.temperature", "choice.k", "choice.exp
 CHOICE |= {"choice.carriers_follow"}
 FIELDS = frozenset({"fields", "reads", "outbound_cue", "homing_cue"})
 FOODS = frozenset({"foods", "kinds of food"})
-CASTES = frozenset({"castes", "labour.rule", "labour.demand", "labour.relief", "labour.exponent"})
-CASTES |= {"labour.stop_probability"}
+CASTES = frozenset({"castes"})
 OWN_RULES = frozenset({"rules", "reward"})
-COLONY = LONE | CHOICE | FIELDS | FOODS | CASTES | OWN_RULES
-COLONY |= {"pheromone.evaporation", "pheromone.half_life", "pheromone.diffusion"}
-COLONY |= {"pheromone.deposit", "nests"}
-COLONY |= {"life.births", "life.lifespan", "life.regrowth", "life.pile_move_interval"}
+BASE = LONE | CHOICE | FIELDS | FOODS | CASTES | OWN_RULES
+BASE |= {"pheromone.evaporation", "pheromone.half_life", "pheromone.diffusion"}
+BASE |= {"pheromone.deposit", "nests"}
+BASE |= {"life.births", "life.lifespan", "life.regrowth", "life.pile_move_interval"}
+COLONY = BASE | {feature.name for feature in FEATURES}
 
 
 def refuse_unsupported(

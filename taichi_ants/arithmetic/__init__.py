@@ -1,0 +1,1 @@
+"""The arithmetic of kernels: random bits, and functions whose results are equal everywhere."""

@@ -1,0 +1,36 @@
+"""The features of the model; see `taichi_ants.features.feature`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from taichi_ants.features.feature import Array, Feature, Task
+from taichi_ants.features.labour import LABOUR
+
+# In the order of their hooks, which is the order of random draws.
+FEATURES: tuple[Feature, ...] = (LABOUR,)
+INPUTS = {name: read for feature in FEATURES for name, read in feature.inputs.items()}
+
+
+def used_by(task: Task) -> tuple[Feature, ...]:
+    """Return the features that a task uses."""
+    return tuple(feature for feature in FEATURES if feature.is_used(task))
+
+
+def arrays(per: str) -> Iterator[tuple[Feature, Array]]:
+    """Yield the arrays of all features with an entry for each ant or nest."""
+    for feature in FEATURES:
+        for array in feature.arrays:
+            if array.per == per:
+                yield feature, array
+
+
+def feature_of_input(name: str) -> Feature | None:
+    """Return the feature that has an input of your rules; None if none has it."""
+    return next((feature for feature in FEATURES if name in feature.inputs), None)
+
+
+def numbers_of_castes(features: tuple[Feature, ...]) -> dict[str, Any]:
+    """Return the numbers of castes that features declare, by name, in order."""
+    return {name: of for feature in features for name, of in feature.of_castes.items()}

@@ -1,0 +1,166 @@
+"""Features of the model. Each is one file: its settings, arrays, hooks, measures and words.
+
+The engine, the state of a colony, its snapshots and files, your rules, measures, recordings and the
+description of a model walk over the declarations; none of them names a feature. `FEATURES` lists
+the features in the order of their hooks, which is the order of random draws, and `POINTS` the
+places in a tick at which hooks run.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from taichi_ants.features.points import POINTS
+from taichi_ants.settings import Settings
+
+ANT, NEST = "ant", "nest"
+Function = Callable[..., Any]
+# Of `taichi_ants.task`, which imports the features.
+Task = Any
+Caste = Any
+
+
+class Array(NamedTuple):
+    """An array of a colony with an entry for each ant, or each nest, 0 at the start of an episode.
+
+    Attributes:
+        name: Its name in hooks; that of the array in kernels, and in files.
+        per: ANT or NEST.
+        dtype: The type in kernels: "i1", "i4" or "f4" per ant, "f8" per nest.
+        view: Its name as an attribute of a colony, and of a snapshot with "ant_" in front.
+        shown_as: The type there.
+        values, unit: The words of the description of a model.
+    """
+
+    name: str
+    per: str
+    dtype: str
+    view: str
+    shown_as: str
+    values: str = "at least 0"
+    unit: str = ""
+
+
+class Measured(NamedTuple):
+    """A measure of the ants: a function of a `Snapshot`, the unit, and words."""
+
+    function: Function
+    unit: str
+    words: str
+
+
+class Input(NamedTuple):
+    """An input of your rules: its meaning, and its number of entries if it is a vector, else 0."""
+
+    meaning: str
+    length: int = 0
+
+
+class KernelFunction:
+    """A plain function that becomes a Taichi function when a kernel first calls it.
+
+    So the files of features do not import Taichi, and commands start quickly.
+    """
+
+    _is_taichi_function = False  # Taichi requires this attribute, with any value
+
+    def __init__(self, body: Function) -> None:
+        self.body, self.__doc__ = body, body.__doc__
+
+    @cached_property
+    def _func(self) -> Function:
+        import taichi as ti
+
+        # Views of ants and nests, which are arguments of hooks, are no values of the kernel.
+        views = {"a", "nest"} & inspect.signature(self.body).parameters.keys()
+        self.body.__annotations__ = dict.fromkeys(views, ti.template())
+        return ti.func(self.body)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._func(*arguments)
+
+
+class _Late:
+    """A module that is imported at its first use, when a kernel compiles."""
+
+    def __init__(self, load: Callable[[], Any]) -> None:
+        self._load = load
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._load(), name)
+
+
+ti: Any = _Late(lambda: import_module("taichi"))
+bits: Any = _Late(lambda: import_module("taichi_ants.arithmetic.random_bits"))
+numbers: Any = _Late(lambda: import_module("taichi_ants.arithmetic.numbers"))
+
+
+@dataclass(eq=False, frozen=True, repr=False)
+class Feature:
+    """A group of rules, which a task uses if its group of settings differs from the default.
+
+    Attributes:
+        settings: The class of the group; the last part of its path is the name of the feature.
+        arrays: The arrays that it adds to the state of a colony.
+        numbers: Settings that hooks read as `a.NAME.SETTING`, f64.
+        of_castes: Numbers of each caste, f64, which hooks read as `a.NAME`: functions of a task and
+            a caste.
+        fixed: Functions of a caste whose results cannot change in an episode, by words for them.
+        faults: A function of a task that yields what is wrong with it, as sentences.
+        example: Settings of a task that uses the feature.
+        measures: Its measures by name.
+        hooks: Its hooks by the names of points.
+        inputs: Inputs of your rules by name, with the functions of an ant that return them.
+        by_deliveries: The inputs that change with the deliveries of a tick before ants observe.
+    """
+
+    settings: type[Settings]
+    arrays: tuple[Array, ...] = ()
+    numbers: tuple[str, ...] = ()
+    of_castes: Mapping[str, Callable[[Task, Caste], float]] = field(default_factory=dict)
+    fixed: Mapping[str, Callable[[Caste], Any]] = field(default_factory=dict)
+    faults: Callable[[Task], Iterator[str]] = lambda task: iter(())
+    example: Mapping[str, Any] = field(default_factory=dict)
+    measures: Mapping[str, Measured] = field(default_factory=dict)
+    hooks: dict[str, KernelFunction] = field(default_factory=dict)
+    inputs: dict[str, tuple[Input, KernelFunction]] = field(default_factory=dict)
+    by_deliveries: set[str] = field(default_factory=set)
+
+    @property
+    def name(self) -> str:
+        """The name of its group of settings in a task."""
+        return self.settings.path.rpartition(".")[2]
+
+    def of(self, task: Task) -> Any:
+        """Return its settings in a task."""
+        return getattr(task, self.name)
+
+    def is_used(self, task: Task) -> bool:
+        """Whether a task uses the feature."""
+        return self.of(task) != self.settings()
+
+    def hook(self, body: Function) -> KernelFunction:
+        """Register a hook at the point of its name, as a decorator."""
+        given = " ".join(inspect.signature(body).parameters)
+        expected = POINTS[body.__name__].arguments
+        if given != expected:
+            raise TypeError(f"{self.name}.{body.__name__} has ({given}), not ({expected})")
+        self.hooks[body.__name__] = KernelFunction(body)
+        return self.hooks[body.__name__]
+
+    def input(self, meaning: str, by_deliveries: bool = False) -> Callable[[Function], Function]:
+        """Register a function of an ant as an input of your rules, as a decorator."""
+
+        def register(body: Function) -> KernelFunction:
+            name, words = body.__name__, f"{meaning}; needs `{self.settings.path}`"
+            self.inputs[name] = Input(words), KernelFunction(body)
+            if by_deliveries:
+                self.by_deliveries.add(name)
+            return self.inputs[name][1]
+
+        return register

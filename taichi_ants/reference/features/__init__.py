@@ -1,0 +1,34 @@
+"""The features of the model in plain Python: a file for each, with the points of its hooks.
+
+A file has functions by the names of `taichi_ants.features.points`, whose first argument is the
+`ReferenceColony`; `inputs` of an ant for your rules; and `MEASURES` of a colony. The values of a
+feature are in `Ant.own` and in `WorldState.of_nests`, by the names of its arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from taichi_ants.features import FEATURES
+from taichi_ants.reference.ants import Ant
+from taichi_ants.task import Task
+
+if TYPE_CHECKING:
+    from taichi_ants.reference.world_state import WorldState
+
+# In the order of the features, which is the order of random draws.
+TWINS = {feature.name: import_module(f"{__name__}.{feature.name}") for feature in FEATURES}
+
+
+def hooks(task: Task, point: str) -> list[Callable[..., Any]]:
+    """Return the functions of the features that a task uses at a point."""
+    used = (name for name in TWINS if getattr(task, name) != type(getattr(task, name))())
+    return [getattr(TWINS[name], point) for name in used if hasattr(TWINS[name], point)]
+
+
+def inputs_of(world: WorldState, ant: Ant, task: Task) -> dict[str, Any]:
+    """Return the inputs of your rules that the features of a task have for an ant."""
+    of_features = [inputs(world, ant) for inputs in hooks(task, "inputs")]
+    return {name: value for inputs in of_features for name, value in inputs.items()}
