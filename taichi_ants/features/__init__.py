@@ -2,20 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
-from taichi_ants.features.feature import Array, Feature, Task
+import numpy as np
+
+from taichi_ants.features.feature import Array, Feature, KernelFunction, Task
 from taichi_ants.features.labour import LABOUR
+from taichi_ants.features.noise import MISREAD, SLIP
+from taichi_ants.features.points import POINTS
 
 # In the order of their hooks, which is the order of random draws.
-FEATURES: tuple[Feature, ...] = (LABOUR,)
+FEATURES: tuple[Feature, ...] = (LABOUR, SLIP, MISREAD)
 INPUTS = {name: read for feature in FEATURES for name, read in feature.inputs.items()}
 
 
 def used_by(task: Task) -> tuple[Feature, ...]:
     """Return the features that a task uses."""
     return tuple(feature for feature in FEATURES if feature.is_used(task))
+
+
+def hooks_at(features: Collection[Feature]) -> dict[str, list[KernelFunction]]:
+    """Return the hooks of features at each point, in their order."""
+    return {
+        point: [feature.hooks[point] for feature in features if point in feature.hooks]
+        for point in POINTS
+    }
+
+
+def probabilities(task: Task) -> dict[str, np.uint64]:
+    """Return the probabilities of features as kernels read them: bounds of a random 32-bit word."""
+    return {
+        f"{name}_below": np.uint64(getattr(feature.of(task), name) * 4294967296.0)
+        for feature in FEATURES
+        for name in feature.probabilities
+    }
 
 
 def arrays(per: str) -> Iterator[tuple[Feature, Array]]:

@@ -102,12 +102,16 @@ numbers: Any = _Late(lambda: import_module("taichi_ants.arithmetic.numbers"))
 
 @dataclass(eq=False, frozen=True, repr=False)
 class Feature:
-    """A group of rules, which a task uses if its group of settings differs from the default.
+    """A group of rules, or a part of one.
 
     Attributes:
-        settings: The class of the group; the last part of its path is the name of the feature.
+        settings: The class of its group of settings in a task.
+        switch: The setting of which the default means that a task does not use the feature; by
+            default all settings of the group.
+        runs_alone: Whether lone ants have the feature, too.
         arrays: The arrays that it adds to the state of a colony.
-        numbers: Settings that hooks read as `a.NAME.SETTING`, f64.
+        numbers: Settings that hooks read as `a.GROUP.SETTING`, f64.
+        probabilities: Settings that hooks read as `a.SETTING_below`: a bound of random words, u64.
         of_castes: Numbers of each caste, f64, which hooks read as `a.NAME`: functions of a task and
             a caste.
         fixed: Functions of a caste whose results cannot change in an episode, by words for them.
@@ -120,8 +124,11 @@ class Feature:
     """
 
     settings: type[Settings]
+    switch: str = ""
+    runs_alone: bool = False
     arrays: tuple[Array, ...] = ()
     numbers: tuple[str, ...] = ()
+    probabilities: tuple[str, ...] = ()
     of_castes: Mapping[str, Callable[[Task, Caste], float]] = field(default_factory=dict)
     fixed: Mapping[str, Callable[[Caste], Any]] = field(default_factory=dict)
     faults: Callable[[Task], Iterator[str]] = lambda task: iter(())
@@ -132,17 +139,25 @@ class Feature:
     by_deliveries: set[str] = field(default_factory=set)
 
     @property
-    def name(self) -> str:
+    def group(self) -> str:
         """The name of its group of settings in a task."""
         return self.settings.path.rpartition(".")[2]
 
+    @property
+    def name(self) -> str:
+        """Its name: the group, with the switch after a point if it has one."""
+        return f"{self.group}.{self.switch}" if self.switch else self.group
+
     def of(self, task: Task) -> Any:
         """Return its settings in a task."""
-        return getattr(task, self.name)
+        return getattr(task, self.group)
 
     def is_used(self, task: Task) -> bool:
         """Whether a task uses the feature."""
-        return self.of(task) != self.settings()
+        chosen, default = self.of(task), self.settings()
+        if self.switch:
+            return getattr(chosen, self.switch) != getattr(default, self.switch)
+        return chosen != default
 
     def hook(self, body: Function) -> KernelFunction:
         """Register a hook at the point of its name, as a decorator."""

@@ -39,5 +39,11 @@ POINTS = {
         "returns whether the ant stops after it has learned; one of the hooks is enough.",
     ),
     "stopped": Point("a", "An ant that stops has learned from its last action."),
+    "see": Point(
+        "a code stream",
+        "An ant is about to observe a cell in view, which shows the code of the hook before, at "
+        "first the true one: 0 to 3, see `taichi_ants.task.constants`. The hook returns the code "
+        "that the ant sees, and the random stream.",
+    ),
     "tick_ended": Point("nest", "A tick ends."),
 }

@@ -98,23 +98,3 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
     if world.has_compass(ant) and any(weights[side] and nearer[side] for side in range(3)):
         weights = [weights[side] if nearer[side] else 0.0 for side in range(3)]
     return weighted(weights, low)
-
-
-def slipped(action: int, slip: float, stream: RandomStream) -> int:
-    """Return the action that an ant executes instead of the one it chose."""
-    if slip == 0:
-        return action
-    high, low = stream.draw()
-    return pick(low, N_ACTIONS) if high < int(slip * _WORDS) else action
-
-
-def misread_codes(
-    codes: Sequence[int], turns: Sequence[int], misread: float, stream: RandomStream
-) -> dict[int, int]:
-    """Return the codes that an ant sees instead of the true ones, by turns from its heading."""
-    seen = {}
-    for code, turn in zip(codes, turns, strict=True):
-        high, low = stream.draw()
-        if high < int(misread * _WORDS):
-            seen[turn] = [other for other in range(4) if other != code][pick(low, 3)]
-    return seen

@@ -27,12 +27,7 @@ from taichi_ants.reference.castes import (
     draw_trait,
     epsilon_of,
 )
-from taichi_ants.reference.choice import (
-    choose_action,
-    choose_cell,
-    misread_codes,
-    slipped,
-)
+from taichi_ants.reference.choice import choose_action, choose_cell
 from taichi_ants.reference.features import hooks
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
@@ -200,9 +195,15 @@ class ReferenceColony:
     def observe(self, ant: Ant) -> None:
         """Update the paper's state and the state index of an ant, which may misread cells."""
         ant.paper_state, ant.misread = observe(self.world, ant), {}
-        if self.task.noise.misread > 0 and self.episode >= 0:  # not before the first episode
-            codes = codes_in_view(self.world, ant, self._turns)
-            ant.misread = misread_codes(codes, self._turns, self.task.noise.misread, ant.stream)
+        sees = hooks(self.task, "see") if self.episode >= 0 else []  # not before the first episode
+        for turn, code in zip(
+            self._turns, codes_in_view(self.world, ant, self._turns), strict=True
+        ):
+            seen = code
+            for see in sees:
+                seen = see(self, ant, seen)
+            if seen != code:
+                ant.misread[turn] = seen
         ant.state = self._row(self.world, ant)
 
     def begin_episode(self, world: World | None = None) -> None:
@@ -238,7 +239,9 @@ class ReferenceColony:
                 continue
             ant.action = self._draw_action(ant, tick) if ant.chosen is None else ant.chosen
             ant.chosen = None
-            action = slipped(ant.action, self.task.noise.slip, ant.stream)
+            action = ant.action
+            for execute in hooks(self.task, "execute"):
+                action = execute(self, ant, action)
             intents.append(intend(self.world, ant, action, traffic))
         carry_out(self.world, intents, tick, self.task)
         for intent in intents:

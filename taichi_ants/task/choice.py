@@ -1,4 +1,4 @@
-"""The settings by which ants choose actions, and by which their actions and observations fail."""
+"""The settings by which ants choose actions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import Rule
-from taichi_ants.settings import Setting, Settings, Share
+from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
     import numpy as np
@@ -83,31 +83,3 @@ class Choice(Settings, path="task.choice"):
         import numpy as np
 
         return np.array([self.temperature or 0.0, self.k or 0.0, self.exponent or 0.0])
-
-
-@dataclass(frozen=True)
-class Noise(Settings, path="task.noise"):
-    """Failures of actions and observations; by default, there are none.
-
-    With probability `slip`, an ant executes one of the five actions, drawn uniformly, instead of
-    the action that it chose. Learners learn about the chosen action. With probability `misread`, an
-    ant sees a cell in view as another of the four codes, drawn uniformly. This changes the state
-    index by which ants choose and learn, but not the results and rewards of actions.
-    """
-
-    slip: Annotated[
-        Share, Setting("probability that an ant executes a random action instead of the chosen one")
-    ] = 0.0
-    misread: Annotated[
-        Share, Setting("probability with which a cell in view is seen as another of the four codes")
-    ] = 0.0
-
-    @property
-    def numbers(self) -> dict[str, np.uint64]:
-        """The probabilities as kernels read them: bounds of a random 32-bit word."""
-        import numpy as np
-
-        return {
-            "slip_below": np.uint64(self.slip * 4294967296.0),
-            "misread_below": np.uint64(self.misread * 4294967296.0),
-        }

@@ -49,9 +49,11 @@ class Model:
     ) -> None:
         self.learner, self.own_tables, self.is_given_actions = learner, own_tables, is_given_actions
         self.observation, self.traffic = task.sees, task.traffic
-        self.slips, self.misreads = task.noise.slip > 0, task.noise.misread > 0
         self.ants_change, self.food_changes = task.ants_change, task.food_changes
         self.features = used_by(task)
+        # Whether actions can be executed differently, and cells seen differently.
+        self.slips = any("execute" in feature.hooks for feature in self.features)
+        self.misreads = any("see" in feature.hooks for feature in self.features)
         self.has_foods, self.has_loads = bool(task.foods), task.has_loads
         self.n_nests, self.n_kinds = n_nests, max(1, len(task.foods))
         self.n_castes = len(task.castes)  # 0: ants have no castes

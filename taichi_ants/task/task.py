@@ -10,14 +10,15 @@ from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from taichi_ants.errors import shown
-from taichi_ants.features import FEATURES, feature_of_input
+from taichi_ants.features import FEATURES, feature_of_input, probabilities
 from taichi_ants.features.labour import Labour
+from taichi_ants.features.noise import Noise
 from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import Parameters, Rule
 from taichi_ants.settings import Named, Setting, Settings, declared
 from taichi_ants.task import observations
 from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
-from taichi_ants.task.choice import Choice, Noise
+from taichi_ants.task.choice import Choice
 from taichi_ants.task.field import COMPASS, TRAIL, Field
 from taichi_ants.task.food import Food, Ticks
 from taichi_ants.task.observations import Observation
@@ -246,9 +247,9 @@ class Task(Settings, path="task"):
             for read in rules[name].inputs if name in rules else ():
                 owner = feature_of_input(read)
                 if owner is not None and not owner.is_used(self):
-                    example = owner.example[owner.name]
+                    example = owner.example[owner.group]
                     yield (
-                        f"the rule {name!r} reads `{read}`; set `task.{owner.name}`, for example "
+                        f"the rule {name!r} reads `{read}`; set `task.{owner.group}`, for example "
                         f"to {example!r}."
                     )
 
@@ -359,7 +360,7 @@ class Task(Settings, path="task"):
             "lifespan": life.lifespan or off,
             "regrowth": off if life.regrowth is None else life.regrowth,
             "pile_move_interval": life.pile_move_interval or off,
-            **self.noise.numbers,
+            **probabilities(self),
         }
 
     def pheromones_while(self, learning: bool) -> tuple[Pheromone, ...]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from taichi_ants.analysis.bounds.surroundings import Surroundings, in_view, look_around
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.features.support import LONE, refuse_unsupported
+from taichi_ants.features.support import PLAIN, refuse_unsupported
 from taichi_ants.task import Rewards, Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, PICK_UP
 from taichi_ants.worlds.world import World
@@ -30,7 +30,7 @@ MAX_STATES = 2_000_000
 # The cost of a step in the search for the shortest delivery. It is above twice the rewards of any
 # shortest delivery, and small enough for exact sums.
 _STEP = 1 << 32
-SUPPORTS = LONE - {"noise.slip", "noise.misread"}
+SUPPORTS = PLAIN
 # Differences of action values up to these count as rounding errors: relative to the value of the
 # state and, for sums that cancel, relative to the largest value. With a discount of 0.9, a reward
 # of 10 that is 300 steps away is therefore ignored.

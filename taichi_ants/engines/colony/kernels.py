@@ -25,7 +25,7 @@ from taichi_ants.engines.colony.layout import (
     array_of,
 )
 from taichi_ants.engines.colony.views import names_of
-from taichi_ants.features.points import POINTS
+from taichi_ants.features import hooks_at
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
@@ -53,10 +53,7 @@ class Variant:
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if model.traffic.shared else 0
         # The hooks of features at each point, in their order.
-        self.at = {
-            point: [feature.hooks[point] for feature in model.features if point in feature.hooks]
-            for point in POINTS
-        }
+        self.at = hooks_at(model.features)
         self.can_rest = bool(self.at["rests"])
         self.names = names_of(model)
         own = own_inputs.own_rules(model.rules)

@@ -114,7 +114,7 @@ def observe_by(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, 
         state = paper_state
         if ti.static(v.misreads):
             state, c.streams[ant] = noise.misread_paper_state(
-                paper_state, c.streams[ant], c.misread_below
+                paper_state, c.streams[ant], v.at["see"], ant_view(c, v, w, ant)
             )
     elif trait(c.carries, ant) == 1:  # compiled twice, each time without what the other load needs
         paper_state, state = observe_with(c, v, cues, w, ant, 1, tick)
@@ -129,7 +129,9 @@ def observe_with(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant
     view = view_around(c, v, cues, w, ant, carries, tick)
     paper_state = view.paper_state  # the true one
     if ti.static(v.misreads):
-        c.streams[ant] = noise.misread_view(view, v.observation, c.streams[ant], c.misread_below)
+        c.streams[ant] = noise.misread_view(
+            view, v.observation, c.streams[ant], v.at["see"], ant_view(c, v, w, ant)
+        )
     return paper_state, v.encode(view)
 
 
@@ -500,9 +502,9 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         state = state_index_of(c, v, ant)
         action = draw_action(c, v, w, ant, state, paper_state, tick, random_state)
     chosen = action
-    if ti.static(v.slips):
+    for execute in ti.static(v.at["execute"]):
         if resting == 0:
-            action, random_state = noise.slipped(action, random_state, c.slip_below)
+            action, random_state = execute(ant_view(c, v, w, ant), action, random_state)
     heading = turned_by(c.compass, trait(c.heading, ant), action)
     step = step_towards(c.compass, heading, FORWARD)
     # Arithmetic, because the compiler makes branches of selections between values in memory.

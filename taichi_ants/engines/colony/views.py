@@ -53,7 +53,7 @@ def names_of(model: Model) -> Names:
                 for array in feature.arrays
             },
         },
-        {feature.name: feature.numbers for feature in used},
+        {feature.group: feature.numbers for feature in used if feature.numbers},
     )
 
 

@@ -23,14 +23,14 @@ from taichi_ants.engines.layout import (
     RETURNS,
     STEPS,
 )
-from taichi_ants.engines.runs.step import Ant, Rules, act, observe_function, restore
+from taichi_ants.engines.runs.step import Ant, Rules, act, ant_view, observe_function, restore
+from taichi_ants.features import hooks_at
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.events import Event
 from taichi_ants.task.rules.delivery import step_end
-from taichi_ants.task.rules.noise import slipped
 from taichi_ants.task.rules.policy import chance_of, chance_of_softly, choose, choose_softly
 
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
@@ -53,7 +53,7 @@ def run_kernel(
     hyperparameters = learner.hyperparameters if learns else Hyperparameters
     read = read_rates(hyperparameters)
     columns = N_SETTINGS + len(fields(hyperparameters))
-    observe = observe_function(rules)
+    observe, executes = observe_function(rules), hooks_at(rules.features)["execute"]
     n_states = rules.observation.n_states
     table = n_states * ROW
 
@@ -130,8 +130,10 @@ def run_kernel(
                     if ti.static(traced):
                         a.trace_chances[n_recorded] = chance
                     executed = action
-                    if ti.static(rules.slips):
-                        executed, ant.random_state = slipped(action, ant.random_state, a.slip_below)
+                    for execute in ti.static(executes):
+                        executed, ant.random_state = execute(
+                            ant_view(a, ant), executed, ant.random_state
+                        )
                     before = ant
                     ant = act(rules.deposit, True, a, base, ant, paper_state, executed, clock)
                     clock += a.evaporates

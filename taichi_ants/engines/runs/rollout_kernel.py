@@ -18,14 +18,15 @@ from taichi_ants.engines.runs.step import (
     Ant,
     Rules,
     act,
+    ant_view,
     observe_function,
     reason_of,
     restore,
 )
+from taichi_ants.features import hooks_at
 from taichi_ants.task.constants import PICK_UP
 from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.rules.delivery import step_end
-from taichi_ants.task.rules.noise import slipped
 from taichi_ants.task.rules.pheromone import FADING
 from taichi_ants.task.rules.policy import choose_from_masks
 
@@ -55,6 +56,7 @@ def rollout_kernel(
     longer. Each ant draws from its stream in the order of a colony's.
     """
     deposit, observe, single = rules.deposit, observe_function(rules), width == 0
+    executes = hooks_at(rules.features)["execute"]
 
     @ti.func
     def record(a: ti.template(), row, code):
@@ -100,8 +102,10 @@ def rollout_kernel(
             begins = ti.cast(command == Command.BEGIN, ti.i32)
             if command == Command.STEP:
                 executed, before = action, ant
-                if ti.static(rules.slips):
-                    executed, ant.random_state = slipped(action, ant.random_state, a.slip_below)
+                for execute in ti.static(executes):
+                    executed, ant.random_state = execute(
+                        ant_view(a, ant), executed, ant.random_state
+                    )
                 into = ti.select(executed == PICK_UP, own, base)
                 ant = act(deposit, False, a, into, ant, paper_state, executed, steps * a.evaporates)
                 event = ant.event

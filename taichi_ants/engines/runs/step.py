@@ -8,7 +8,10 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import draw_below
+from taichi_ants.engines.own_rules import for_kernels
 from taichi_ants.engines.views import encode_function, fill_codes, view_type
+from taichi_ants.features import hooks_at, used_by
+from taichi_ants.features.feature import Feature
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
 from taichi_ants.task.constants import FOOD, FORWARD, LEFT, PICK_UP, QUEEN, RIGHT
@@ -43,24 +46,44 @@ Ant = ti.types.struct(
 class Rules(NamedTuple):
     """The rules of a task that are compiled into kernels.
 
-    For `deposit` and `half`, see `rules.pheromone` and `Pheromone.view`; for `slips` and
-    `misreads`, see `task.Noise`. If `softly`, ants choose by the rule "softmax".
+    For `deposit` and `half`, see `rules.pheromone` and `Pheromone.view`. If `softly`, ants choose
+    by the rule "softmax".
     """
 
     observation: Observation
     deposit: int
     half: bool
-    slips: bool
-    misreads: bool
+    features: tuple[Feature, ...]
     softly: bool
 
     @classmethod
     def of(cls, task: Task) -> "Rules":
         """Return the rules of a task."""
-        pheromone, noise = task.pheromone, task.noise
+        pheromone = task.pheromone
         deposit, half = pheromone.numbers["deposits"], pheromone.view == "half"
         softly = task.choice.rule == "softmax"
-        return cls(task.sees, deposit, half, noise.slip > 0, noise.misread > 0, softly)
+        return cls(task.sees, deposit, half, used_by(task), softly)
+
+
+class View:
+    """A lone ant while a kernel compiles, through which hooks of features read it by name.
+
+    Other names are those of the arrays and numbers of kernels.
+    """
+
+    _data_oriented = True  # Taichi requires it of objects whose attributes kernels read
+
+    def __init__(self, a: Any, ant: Any) -> None:
+        self._a, self._ant = a, ant
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._ant if name in Ant.members else self._a, name)
+
+
+@for_kernels
+def ant_view(a: Any, ant: Any) -> View:
+    """Return the view of an ant."""
+    return View(a, ant)
 
 
 @ti.func
@@ -124,6 +147,7 @@ def observe_function(rules: Rules) -> Callable[..., Any]:
     observation, is_paper = rules.observation, rules.observation.name == "paper"
     in_view = observation.cells
     left, forward, right = observation.ahead
+    sees = hooks_at(rules.features)["see"]
     view_of, encode = view_type(observation, False), encode_function(observation)
 
     @ti.func
@@ -148,11 +172,15 @@ def observe_function(rules: Rules) -> Callable[..., Any]:
         state, after = paper_state, ant.random_state
         if ti.static(not is_paper):
             view = see(a, base, ant, clock)
-            if ti.static(rules.misreads):
-                after = noise.misread_view(view, observation, ant.random_state, a.misread_below)
+            if ti.static(sees):
+                after = noise.misread_view(
+                    view, observation, ant.random_state, sees, ant_view(a, ant)
+                )
             state = encode(view)
-        elif ti.static(rules.misreads):  # no view is needed
-            state, after = noise.misread_paper_state(paper_state, ant.random_state, a.misread_below)
+        elif ti.static(sees):  # no view is needed
+            state, after = noise.misread_paper_state(
+                paper_state, ant.random_state, sees, ant_view(a, ant)
+            )
         return paper_state, state, after
 
     return observe

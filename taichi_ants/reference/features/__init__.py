@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from taichi_ants.reference.world_state import WorldState
 
 # In the order of the features, which is the order of random draws.
-TWINS = {feature.name: import_module(f"{__name__}.{feature.name}") for feature in FEATURES}
+TWINS = {feature.group: import_module(f"{__name__}.{feature.group}") for feature in FEATURES}
 
 
 def hooks(task: Task, point: str) -> list[Callable[..., Any]]:

@@ -1,44 +1,27 @@
-"""Failures of actions and observations: slips, and cells that ants misread; see `task.Noise`.
-
-A slip, and each cell in view, takes one draw of 64 bits. The upper word decides whether the action
-slips or the cell is misread. The lower word chooses the executed action among all five, or the code
-seen among the other three, in ascending order.
-"""
+"""Cells in view that ants see differently, by the hooks `see` of features."""
 
 from typing import Any
 
 import taichi as ti
 
-from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word, low_word
-from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.task.rules.vision import code_in_view, state_index
 
 
 @ti.func
-def slipped(action, random_state, slip_below):
-    """Return the action that an ant executes instead of the chosen one, and the stream after it."""
-    after = advance(random_state)
-    bits = bits_of(after)
-    slips = high_word(bits) < slip_below
-    return ti.select(slips, below(low_word(bits), N_ACTIONS), action), after
-
-
-@ti.func
-def misread_code(code, random_state, misread_below):
+def seen_code(code, random_state, hooks: ti.template(), ant: ti.template()):
     """Return the code that an ant sees instead of the true one, and the stream after it."""
-    after = advance(random_state)
-    bits = bits_of(after)
-    other = below(low_word(bits), 3)
-    other += ti.cast(other >= code, ti.i32)
-    return ti.select(high_word(bits) < misread_below, other, code), after
+    seen, after = code, random_state
+    for see in ti.static(hooks):
+        seen, after = see(ant, seen, after)
+    return seen, after
 
 
 @ti.func
-def misread_paper_state(paper_state, random_state, misread_below):
-    """Return the paper's state with misread codes, and the stream after its three draws."""
-    left, after = misread_code(code_in_view(paper_state, 0), random_state, misread_below)
-    forward, later = misread_code(code_in_view(paper_state, 1), after, misread_below)
-    right, last = misread_code(code_in_view(paper_state, 2), later, misread_below)
+def misread_paper_state(paper_state, random_state, hooks: ti.template(), ant: ti.template()):
+    """Return the paper's state with the codes that an ant sees, and the stream after them."""
+    left, after = seen_code(code_in_view(paper_state, 0), random_state, hooks, ant)
+    forward, later = seen_code(code_in_view(paper_state, 1), after, hooks, ant)
+    right, last = seen_code(code_in_view(paper_state, 2), later, hooks, ant)
     return state_index(paper_state >> 6, left, forward, right), last
 
 
@@ -52,8 +35,11 @@ entry_of._is_taichi_function = False  # type: ignore[attr-defined]
 
 
 @ti.func
-def misread_view(view: ti.template(), observation: ti.template(), random_state, misread_below):
-    """Misread the cells of a view, and return the stream after a draw for each.
+def misread_view(
+    view: ti.template(), observation: ti.template(), random_state, hooks: ti.template(),
+    ant: ti.template()
+):  # fmt: skip
+    """Let an ant see the cells of a view differently, and return the stream after all of them.
 
     A misread cell has another code, no ant, no trail, no further field, and is not nearer to the
     queen. The paper's state of the view consists of the codes seen. The strongest level ahead does
@@ -61,7 +47,7 @@ def misread_view(view: ti.template(), observation: ti.template(), random_state, 
     """
     after = random_state
     for k in ti.static(range(len(observation.cells))):
-        code, after = misread_code(view.codes[k], after, misread_below)
+        code, after = seen_code(view.codes[k], after, hooks, ant)
         if code != view.codes[k]:
             view.codes[k], view.levels[k], view.nearer[k] = code, 0, 0
             view.ants[k], view.other_nest_ants[k] = 0, 0
