@@ -9,11 +9,12 @@ import numpy as np
 
 from taichi_ants.features.feature import Array, Feature, KernelFunction, Task
 from taichi_ants.features.labour import LABOUR
+from taichi_ants.features.life import AGE
 from taichi_ants.features.noise import MISREAD, SLIP
 from taichi_ants.features.points import POINTS
 
 # In the order of their hooks, which is the order of random draws.
-FEATURES: tuple[Feature, ...] = (LABOUR, SLIP, MISREAD)
+FEATURES: tuple[Feature, ...] = (LABOUR, SLIP, MISREAD, AGE)
 INPUTS = {name: read for feature in FEATURES for name, read in feature.inputs.items()}
 
 

@@ -108,6 +108,8 @@ class Feature:
         settings: The class of its group of settings in a task.
         switch: The setting of which the default means that a task does not use the feature; by
             default all settings of the group.
+        uses: A function of a task that says whether it uses the feature, instead of the switch.
+        kills: Whether ants can die by it, so that slots become vacant.
         runs_alone: Whether lone ants have the feature, too.
         arrays: The arrays that it adds to the state of a colony.
         numbers: Settings that hooks read as `a.GROUP.SETTING`, f64.
@@ -125,6 +127,8 @@ class Feature:
 
     settings: type[Settings]
     switch: str = ""
+    uses: Callable[[Task], bool] | None = None
+    kills: bool = False
     runs_alone: bool = False
     arrays: tuple[Array, ...] = ()
     numbers: tuple[str, ...] = ()
@@ -154,6 +158,8 @@ class Feature:
 
     def is_used(self, task: Task) -> bool:
         """Whether a task uses the feature."""
+        if self.uses is not None:
+            return self.uses(task)
         chosen, default = self.of(task), self.settings()
         if self.switch:
             return getattr(chosen, self.switch) != getattr(default, self.switch)

@@ -33,6 +33,12 @@ POINTS = {
         "says is enough: the ant then has no event and no reward, lays nothing and does not learn.",
     ),
     "delivered": Point("nest n", "A nest has received n food items in this tick."),
+    "gave": Point("a", "An ant has delivered its food in this tick."),
+    "aged": Point(
+        "a",
+        "Ants have acted, and newborn ants have their places. The hook returns whether the ant "
+        "dies; one of the hooks is enough. A dying ant still learns in this tick.",
+    ),
     "acted": Point(
         "a",
         "All ants have acted, and this one, which does not rest, is about to observe. The hook "

@@ -31,7 +31,6 @@ class Ant:
     Attributes:
         slot: The ant's place in the colony, 0 .. slots - 1; free again after its death.
         number: 0 .. n - 1 for the initial ants; n, n + 1, ... for ants born in the episode.
-        age: Ticks since the ant was born, if there is a lifespan.
         carried: Ticks since the ant's last pick-up or delivery, its birth, or the start.
         nest: The number of its nest.
         kind: The kind of the last food that it picked up.
@@ -52,7 +51,6 @@ class Ant:
     slot: int = 0
     number: int = 0
     stream: RandomStream = field(default_factory=lambda: RandomStream(0))
-    age: int = 0
     carried: int = 0
     paper_state: int = 0
     state: int = 0

@@ -316,6 +316,8 @@ class ReferenceColony:
                 record.delivered[ant.nest, ant.kind] += 1
                 record.by_caste[ant.caste] += 1
                 fed[ant.nest] += 1
+                for gave in hooks(task, "gave"):
+                    gave(self, ant)
         if record.deliveries and record.first_delivery < 0:
             record.first_delivery = record.ticks + 1
         for nest, n in enumerate(fed):
@@ -352,14 +354,11 @@ class ReferenceColony:
         self.next_number += 1
 
     def _deaths(self, acting: Sequence[Ant]) -> list[Ant]:
-        """Remove and return the ants that die of age, which still observe and learn in this tick.
+        """Remove and return the ants that die, which still observe and learn in this tick.
 
         A dying ant leaves its food on its cell.
         """
-        spans = [caste_of(self.task, ant).lifespan or self.task.life.lifespan for ant in acting]
-        for ant, span in zip(acting, spans, strict=True):
-            ant.age += span is not None
-        dying = [a for a, span in zip(acting, spans, strict=True) if span and a.age >= span]
+        dying = [ant for ant in acting if self._any("aged", ant)]
         for ant in dying:
             del self.world.ants[ant.cell]
             if ant.carries:

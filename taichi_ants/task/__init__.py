@@ -1,6 +1,7 @@
 """The rules: observations, actions, pheromone and rewards of ants."""
 
 from taichi_ants.features.labour import Labour, Threshold
+from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
 from taichi_ants.task.caste import Caste
 from taichi_ants.task.choice import Choice
@@ -9,7 +10,7 @@ from taichi_ants.task.food import Food
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
-from taichi_ants.task.task import Life, Task, Traffic, fetching, foraging, paper, queueing
+from taichi_ants.task.task import Task, Traffic, fetching, foraging, paper, queueing
 
 __all__ = [
     "Caste",

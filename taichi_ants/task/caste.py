@@ -9,10 +9,10 @@ from typing import Annotated, Any
 from taichi_ants.errors import AntsError
 from taichi_ants.features import FEATURES
 from taichi_ants.features.labour import Threshold
+from taichi_ants.features.life import Ticks
 from taichi_ants.settings import Setting, Settings
 from taichi_ants.task.choice import Attraction, Exponent, Temperature
 from taichi_ants.task.constants import MAX_CASTES, MAX_NESTS
-from taichi_ants.task.food import Ticks
 
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
 Rate = Annotated[float | None, Setting(least=0, most=1)]

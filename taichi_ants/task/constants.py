@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from taichi_ants.grid.constants import MAX_STEPS as MAX_STEPS
+
 # Codes of the cells in view (two bits each in a state index).
 SEES_EMPTY = 0  # E
 SEES_OBSTACLE = 1  # O
@@ -40,7 +42,6 @@ MOST_REWARD = 1000
 DEPOSIT_LEVEL = 250
 # A trail stores the tick at which it has evaporated, so a level plus a step must fit into 32 bits.
 MAX_TRAIL_LEVEL = 1_000_000_000
-MAX_STEPS = 10_000_000
 
 # The default length of training, as in the paper: the episodes of one ant, and their step limit.
 EPISODES = 500

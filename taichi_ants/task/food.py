@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from taichi_ants.features.life import Ticks
 from taichi_ants.settings import Setting, Settings
-from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_STEPS
+from taichi_ants.task.constants import MAX_FOOD_KINDS
 from taichi_ants.task.rewards import Reward
 
 MAX_LOADS = 1_000_000
-Ticks = Annotated[int | None, Setting(unit="ticks", least=1, most=MAX_STEPS)]
 
 
 @dataclass(frozen=True)

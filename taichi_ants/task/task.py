@@ -10,8 +10,9 @@ from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from taichi_ants.errors import shown
-from taichi_ants.features import FEATURES, feature_of_input, probabilities
+from taichi_ants.features import FEATURES, feature_of_input, probabilities, used_by
 from taichi_ants.features.labour import Labour
+from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
 from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import Parameters, Rule
@@ -20,7 +21,7 @@ from taichi_ants.task import observations
 from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
 from taichi_ants.task.choice import Choice
 from taichi_ants.task.field import COMPASS, TRAIL, Field
-from taichi_ants.task.food import Food, Ticks
+from taichi_ants.task.food import Food
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
@@ -86,31 +87,6 @@ class Traffic(Settings, path="task.traffic"):
     def shared(self) -> bool:
         """Whether any ant may enter a cell with an ant on it."""
         return self.swap or self.follow
-
-
-@dataclass(frozen=True)
-class Life(Settings, path="task.life"):
-    """Births, deaths, and changes of food, for colonies only; by default, there are none.
-
-    None means that ants do not die, food does not grow back, or food does not move. With `regrowth`
-    0, food grows back in the same tick.
-    """
-
-    births: Annotated[bool, Setting("turn each food item that the queen receives into an ant")] = (
-        False
-    )
-    lifespan: Annotated[Ticks, Setting("age at which an ant dies")] = None
-    regrowth: Annotated[Ticks, Setting("time until taken food grows back in its cell", least=0)] = (
-        None
-    )
-    pile_move_interval: Annotated[
-        Ticks, Setting("interval at which each pile of food moves by one cell")
-    ] = None
-
-    @property
-    def changes(self) -> bool:
-        """Whether any setting differs from its default."""
-        return self != Life()
 
 
 @dataclass(frozen=True, repr=False)
@@ -308,8 +284,7 @@ class Task(Settings, path="task"):
     @property
     def ants_change(self) -> bool:
         """Whether ants are born or die."""
-        spans = [self.life.lifespan, *(caste.lifespan for caste in self.castes.values())]
-        return self.life.births or any(span is not None for span in spans)
+        return self.life.births or any(feature.kills for feature in used_by(self))
 
     def cues_of(self, caste: Caste | None) -> tuple[int, int]:
         """Return the numbers of the outbound and the homing cue of a caste, or of the task."""

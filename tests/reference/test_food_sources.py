@@ -41,7 +41,7 @@ def test_food_grows_back_so_many_ticks_after_it_was_taken(delay):
 def test_food_dropped_elsewhere_does_not_grow_back():
     colony = begun(world((ANT, 1), ((1, 0, 0), 3), foods=[]), regrowth=0, lifespan=100)
     load(colony, 0)
-    colony.ants[0].age = 99
+    colony.ants[0].own["age"] = 99
     act(colony, GIVE, GIVE)
     assert foods_of(colony) == {ANT}
     act(colony, PICK_UP)

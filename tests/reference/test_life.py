@@ -42,7 +42,7 @@ def test_a_food_given_becomes_an_ant_that_faces_away(seed):
         neighbour(QUEEN, heading),
         heading,
     )
-    assert (born.carries, born.age, born.action, born.reward) == (False, 0, -1, 0)
+    assert (born.carries, born.own["age"], born.action, born.reward) == (False, 0, -1, 0)
     assert born.state == observe(colony.world, born)
     assert born.stream.state == stream_state(seed, STREAM_BORN, 1)
     assert colony.stores[0] == 0
@@ -83,9 +83,9 @@ def test_an_ant_dies_at_its_lifespan():
     colony = begun(COLUMN, lifespan=2)
     front, rear = cells_of(colony)
     act(colony, GIVE, GIVE)
-    assert [ant.age for ant in colony.ants.values()] == [1, 1]
+    assert [ant.own["age"] for ant in colony.ants.values()] == [1, 1]
     assert colony.record.deaths == 0
-    colony.ants[1].age = 0  # the one behind lives on
+    colony.ants[1].own["age"] = 0  # the one behind lives on
     act(colony, GIVE, FORWARD)
     # Blocked, since the cell was taken at the start of the tick; but now it looks empty.
     assert cells_of(colony) == [rear]
@@ -106,7 +106,7 @@ def test_a_carrying_ant_leaves_its_food_where_it_dies():
     colony = begun(COLUMN, lifespan=2)
     load(colony, 0)
     front, _ = cells_of(colony)
-    colony.ants[0].age = 1
+    colony.ants[0].own["age"] = 1
     act(colony, FORWARD, GIVE)  # blocked by the queen
     assert foods_of(colony) == {front}
     assert colony.world.ground[front] == FOOD

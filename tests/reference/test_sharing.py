@@ -171,7 +171,7 @@ def test_an_ant_born_into_a_slot_begins_with_nothing():
         world, learning, "independent", q_values=q_values, births=True, capacity=3, lifespan=50
     )
     assert (colony.q_values[:, 127, 0] == 9).all()
-    colony.ants[1].age = 49
+    colony.ants[1].own["age"] = 49
     load(colony, 0)
     act(colony, GIVE, FORWARD)
     assert sorted(colony.ants) == [0, 2]

@@ -43,8 +43,6 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     assert grid.cells(colony.cells[world, slots]).tolist() == [list(ant.cell) for ant in theirs]
     for name in ("heading", "carries", "number", "paper_state", "action", "event"):
         assert mine[name] == [getattr(ant, name) for ant in theirs], name
-    if colony.model.ants_change:
-        assert mine["age"] == [ant.age for ant in theirs]
     assert mine["streams"] == [ant.stream.state for ant in theirs]
     for name in ("state", "nest", "caste"):
         column = getattr(colony, f"{name}s")[world, slots]

@@ -121,6 +121,7 @@ def tick_phases(v: Variant) -> Iterator[Phase]:
         yield Phase(WORLD, life.count)
     if v.ants_change:
         yield Phase(WORLD, life.give_birth)
+    if v.at["aged"]:
         yield Phase(ANTS, life.grow_old)
     if v.food_changes:
         yield Phase(WORLD, life.regrow)

@@ -37,7 +37,6 @@ COLUMNS = {
     "want": Column(np.int32),
     # The state index, unless it is the paper's state.
     "state": Column(np.int32, 0, lambda model: not model.sees_paper_state),
-    "age": Column(np.int32, 0, lambda model: model.ants_change),  # in ticks
     # The reward of the last action, if rewards are by your own rule.
     "reward": Column(np.int32, 0, lambda model: model.has_own_reward),
     "heading": Column(np.int8),
@@ -153,7 +152,6 @@ class CasteRow(IntEnum):
     LEARNS = auto()  # 0 if it follows a policy
     LAYS = auto()  # a bit for each pheromone
     CUES = auto()  # the number of its cues in `Task.all_cues`
-    LIFESPAN = auto()  # -1 if it does not die
 
 
 class FoodRow(IntEnum):

@@ -8,14 +8,13 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below, high_word, stream_of
-from taichi_ants.engines.colony.columns import of_caste, put, trait
+from taichi_ants.engines.colony.columns import put, trait
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
     NESTS_BY_KINDS,
     TALLY_WIDTH,
     TOTALS,
-    CasteRow,
     FoodRow,
     FoodSourceRow,
     NestRow,
@@ -156,7 +155,6 @@ def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, headin
     put(c.event, ant, Event.NONE)  # the slot can have one of an ant that died
     if ti.static(v.slips):
         put(c.executed, ant, -1)
-    c.age[ant] = 0
     c.carried[ant] = 0
     c.number[ant] = number
     born = ti.cast(c.episodes[w], ti.u64) << ti.u64(32) | ti.cast(number, ti.u64)
@@ -175,13 +173,12 @@ def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, headin
 
 @ti.func
 def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Age an ant by one tick; if it reaches its lifespan, empty its cell, or leave its food."""
-    lifespan = c.lifespan
-    if ti.static(v.n_castes > 0):
-        lifespan = ti.cast(of_caste(c, ant, CasteRow.LIFESPAN), ti.i32)
-    if lifespan > 0 and trait(c.stage, ant) == Stage.LIVING:
-        c.age[ant] = c.age[ant] + 1
-        if c.age[ant] >= lifespan:
+    """Let an ant grow old; if it dies, empty its cell, or leave its food there."""
+    if trait(c.stage, ant) == Stage.LIVING:
+        dies = False
+        for aged in ti.static(v.at["aged"]):
+            dies = dies | aged(ant_view(c, v, w, ant))
+        if dies:
             put(c.stage, ant, Stage.DYING)
             tally(c, Tally.DEATHS, chunk, 1)
             left_behind = ti.select(trait(c.carries, ant) == 1, FOOD, EMPTY)

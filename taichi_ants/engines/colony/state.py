@@ -945,7 +945,6 @@ def _caste_numbers(task: Task, discount: float) -> np.ndarray:
             caste.policy is None,
             sum(1 << pheromones.index(name) for name in set(caste.pheromones_laid(pheromones))),
             cues.index(task.cues_of(caste)),
-            _or(caste.lifespan, _or(task.life.lifespan, -1)),
             *(of(task, caste) for of in own.values()),
         )
     return numbers

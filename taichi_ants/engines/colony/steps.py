@@ -642,6 +642,8 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             put(c.heading, ant, heading_after_delivery(heading, c.turns_at_queen))
             tally(c, Tally.DELIVERIES, chunk, 1)
             count_apart(c, v, ant, chunk)
+            for gave in ti.static(v.at["gave"]):
+                gave(ant_view(c, v, w, ant))
         c.carried[ant] = carried + 1
     elif takes:
         event, carries = ti.cast(Event.PICKED_UP, ti.i32), 1

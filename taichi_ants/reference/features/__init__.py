@@ -11,7 +11,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from taichi_ants.features import FEATURES
+from taichi_ants.features import FEATURES, used_by
 from taichi_ants.reference.ants import Ant
 from taichi_ants.task import Task
 
@@ -24,8 +24,8 @@ TWINS = {feature.group: import_module(f"{__name__}.{feature.group}") for feature
 
 def hooks(task: Task, point: str) -> list[Callable[..., Any]]:
     """Return the functions of the features that a task uses at a point."""
-    used = (name for name in TWINS if getattr(task, name) != type(getattr(task, name))())
-    return [getattr(TWINS[name], point) for name in used if hasattr(TWINS[name], point)]
+    used = dict.fromkeys(TWINS[feature.group] for feature in used_by(task))
+    return [getattr(twin, point) for twin in used if hasattr(twin, point)]
 
 
 def inputs_of(world: WorldState, ant: Ant, task: Task) -> dict[str, Any]:

@@ -1,0 +1,66 @@
+"""Life: births, deaths of old age, food that grows back, and piles of food that wander.
+
+The queen and the food of a world change in the phases of the engine, `engines/colony/life.py`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from taichi_ants.features.feature import ANT, Array, Feature, Task, ti
+from taichi_ants.grid.constants import MAX_STEPS
+from taichi_ants.settings import Setting, Settings
+
+Ticks = Annotated[int | None, Setting(unit="ticks", least=1, most=MAX_STEPS)]
+
+
+@dataclass(frozen=True)
+class Life(Settings, path="task.life"):
+    """Births, deaths, and changes of food, for colonies only; by default, there are none.
+
+    None means that ants do not die, food does not grow back, or food does not move. With `regrowth`
+    0, food grows back in the same tick.
+    """
+
+    births: Annotated[bool, Setting("turn each food item that the queen receives into an ant")] = (
+        False
+    )
+    lifespan: Annotated[Ticks, Setting("age at which an ant dies")] = None
+    regrowth: Annotated[Ticks, Setting("time until taken food grows back in its cell", least=0)] = (
+        None
+    )
+    pile_move_interval: Annotated[
+        Ticks, Setting("interval at which each pile of food moves by one cell")
+    ] = None
+
+
+def _ages(task: Task) -> bool:
+    spans = (task.life.lifespan, *(caste.lifespan for caste in task.castes.values()))
+    return any(span is not None for span in spans)
+
+
+AGE = Feature(
+    Life,
+    switch="lifespan",
+    uses=_ages,
+    kills=True,
+    arrays=(Array("age", ANT, "i4", "ages", "i4", unit="ticks"),),
+    of_castes={"lifespan": lambda task, caste: caste.lifespan or task.life.lifespan or -1},
+)
+
+
+@AGE.hook
+def born(a):
+    """Let the ant begin at age 0."""
+    a.age = 0
+
+
+@AGE.hook
+def aged(a):
+    """Let the ant die if it reaches its lifespan."""
+    lifespan, dies = ti.cast(a.lifespan, ti.i32), False
+    if lifespan > 0:
+        a.age = a.age + 1
+        dies = a.age >= lifespan
+    return dies
