@@ -64,10 +64,10 @@ MUTATIONS = [
     # Rules of users.
     ("rules/language.py", '"modulo({}, {})"', '"ti.floor({} / {})"', OWN_RULES),
     # Rules.
-    ("engines/colony/labour.py", "chance = 1.0 / (1.0 + raised)", "chance = 1.0 - raised", CASTES),
-    ("engines/colony/labour.py", "waits = drawn < 0.0", "waits = False", CASTES),
-    ("engines/colony/labour.py", "and trait(c.carries, ant) == 0:", "and True:", CASTES),
-    ("engines/colony/labour.py", "lowered > 0.0, lowered", "True, lowered", COLONY),
+    ("features/labour.py", "chance = 1.0 / (1.0 + raised)", "chance = 1.0 - raised", CASTES),
+    ("features/labour.py", "waits = drawn < 0.0", "waits = False", CASTES),
+    ("features/labour.py", "and a.carries == 0:", "and True:", CASTES),
+    ("features/labour.py", "lowered > 0.0, lowered", "True, lowered", COLONY),
     (
         "engines/colony/learning.py",
         "does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0",
@@ -76,7 +76,7 @@ MUTATIONS = [
     ),
     ("engines/colony/steps.py", ">> number & 1 == 1", ">> 0 & 1 == 1", COLONY),
     ("engines/colony/life.py", "ti.cast(bound <= word, ti.i32)", "0", COLONY),
-    ("task/caste.py", "int(quotas[i]) - quotas[i])", "quotas[i])", CASTES),
+    ("features/castes.py", "int(quotas[i]) - quotas[i])", "quotas[i])", CASTES),
     ("engines/colony/steps.py", "if c.counts_without_food == 1:", "if False:", COLONY),
     ("engines/colony/steps.py", "ti.select(carries == had_food, age, 0)", "age", COLONY),
     (
@@ -164,7 +164,7 @@ MUTATIONS = [
     ("task/rules/policy.py", "cumulative <= drawn", "cumulative < drawn / 2", CHOICE),
     ("task/rules/policy.py", "(is_open_at * is_nearer).sum() > 0", "False", COLONY),
     ("arithmetic/numbers.py", "if m > ti.f64(SQRT_2)", "if m > ti.f64(2.0)", NUMBERS),
-    ("task/rules/noise.py", "ti.cast(other >= code", "ti.cast(other > code", CHOICE),
+    ("features/noise.py", "ti.cast(other >= code", "ti.cast(other > code", CHOICE),
     (
         "task/rules/noise.py",
         "observation.reads[i])[k] = 0",
@@ -202,7 +202,7 @@ MUTATIONS = [
     ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
     ("engines/runs/kernels.py", "= paper_state, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
-    ("engines/colony/life.py", "c.age[ant] >= lifespan", "c.age[ant] > lifespan", COLONY),
+    ("features/life.py", "a.age >= lifespan", "a.age > lifespan", COLONY),
     ("engines/colony/life.py", "tick >= taken + waits", "tick > taken + waits", COLONY),
     (
         "engines/colony/life.py",
@@ -380,7 +380,7 @@ MUTATIONS = [
     ("settings.py", "changed[setting.name] = setting.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
     # Features, and what supports them.
-    ("features.py", ".intersection(supports):", ":", FEATURES),
+    ("features/support.py", ".intersection(supports):", ":", FEATURES),
     ("settings.py", "if value == setting.default:", "if True:", FEATURES),
     # Designs.
     ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),

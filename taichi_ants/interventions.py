@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 import numpy as np
 
 from taichi_ants.errors import AntsError, check_one_of, count, entries_of, is_flag, shown, whole
-from taichi_ants.features import FEATURES
+from taichi_ants.features import fixed_in
+from taichi_ants.features.castes import Caste
 from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.policies import NAMED, checked_values, load_policy
@@ -333,12 +334,12 @@ class SetTask(Intervention, path="task"):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         changed = self.changed(task)
-        castes = {name: caste.fixed for name, caste in task.castes.items()}
-        if castes != {name: caste.fixed for name, caste in changed.castes.items()}:
-            more = "".join(f", or {words}" for one in FEATURES for words in one.fixed)
+        castes = {name: fixed_in(caste) for name, caste in task.castes.items()}
+        if castes != {name: fixed_in(caste) for name, caste in changed.castes.items()}:
+            words = ", or ".join(fixed_in(Caste()))
             raise AntsError(
-                "the task cannot change the share, ants, nest or policy of a caste in an episode"
-                f"{more}; change its other numbers."
+                f"the task cannot change {words} of a caste in an episode; change its other "
+                "numbers."
             )
         if Model(task, learns) != Model(changed, learns):
             old, new = flat(task.as_dict()), flat(changed.as_dict())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +68,6 @@ class Snapshot(Record):
         ant_foods: int32 (n,), the kind of the food that each ant carries; -1 without food.
         food_kinds: uint8 (grid.size,), the kind of the food in each cell; 0 without food.
         queens: int32 (nests,), the flat cell index of the queen of each nest.
-        ant_castes: int32 (n,), the castes of the ants; 0 without castes.
         of_ants: The arrays (n,) of the features of the model by their views, which are attributes,
             too, with "ant_" in front.
         fields: The levels of each pheromone by name, (grid.size,); "trail" is `trail`.
@@ -92,7 +91,6 @@ class Snapshot(Record):
     ant_foods: np.ndarray = field(default_factory=_none)
     food_kinds: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint8))
     queens: np.ndarray = field(default_factory=_none)
-    ant_castes: np.ndarray = field(default_factory=_none)
     of_ants: Mapping[str, np.ndarray] = field(default_factory=dict)
     fields: Mapping[str, np.ndarray] = field(default_factory=dict)
     counts: Mapping[str, Any] = field(default_factory=dict)
@@ -101,6 +99,13 @@ class Snapshot(Record):
     if TYPE_CHECKING:  # the views of arrays of features, see below
 
         def __getattr__(self, name: str) -> np.ndarray: ...
+
+    def ordered(self, order: np.ndarray) -> Snapshot:
+        """Return the snapshot with its ants in the order of some of their indices, int (n,)."""
+        names = [field.name for field in fields(self) if field.name.startswith("ant_")]
+        columns = {name: getattr(self, name)[order] for name in names}
+        of_ants = {view: column[order] for view, column in self.of_ants.items()}
+        return replace(self, **columns, of_ants=of_ants)
 
     @property
     def further_fields(self) -> dict[str, np.ndarray]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_ants.features.castes import CASTES
 from taichi_ants.features.feature import Array, Feature, KernelFunction, Task
 from taichi_ants.features.labour import LABOUR
 from taichi_ants.features.life import AGE
@@ -14,7 +15,7 @@ from taichi_ants.features.noise import MISREAD, SLIP
 from taichi_ants.features.points import POINTS
 
 # In the order of their hooks, which is the order of random draws.
-FEATURES: tuple[Feature, ...] = (LABOUR, SLIP, MISREAD, AGE)
+FEATURES: tuple[Feature, ...] = (CASTES, LABOUR, SLIP, MISREAD, AGE)
 INPUTS = {name: read for feature in FEATURES for name, read in feature.inputs.items()}
 
 
@@ -46,6 +47,11 @@ def arrays(per: str) -> Iterator[tuple[Feature, Array]]:
         for array in feature.arrays:
             if array.per == per:
                 yield feature, array
+
+
+def fixed_in(caste: Any) -> dict[str, Any]:
+    """Return what of a caste cannot change in an episode, by words for it."""
+    return {words: of(caste) for feature in FEATURES for words, of in feature.fixed.items()}
 
 
 def feature_of_input(name: str) -> Feature | None:

@@ -18,20 +18,21 @@ from typing import Any, NamedTuple
 from taichi_ants.features.points import POINTS
 from taichi_ants.settings import Settings
 
-ANT, NEST = "ant", "nest"
+ANT, NEST, CASTE = "ant", "nest", "caste"
 Function = Callable[..., Any]
 # Of `taichi_ants.task`, which imports the features.
 Task = Any
 Caste = Any
+State = Any  # a `ColonyState`
 
 
 class Array(NamedTuple):
-    """An array of a colony with an entry for each ant, or each nest, 0 at the start of an episode.
+    """An array of a colony by ant, or by world and nest or caste, 0 at the start of an episode.
 
     Attributes:
         name: Its name in hooks; that of the array in kernels, and in files.
-        per: ANT or NEST.
-        dtype: The type in kernels: "i1", "i4" or "f4" per ant, "f8" per nest.
+        per: ANT, NEST or CASTE.
+        dtype: The type in kernels; "i1", "i4" or "f4" per ant.
         view: Its name as an attribute of a colony, and of a snapshot with "ant_" in front.
         shown_as: The type there.
         values, unit: The words of the description of a model.
@@ -117,6 +118,9 @@ class Feature:
         of_castes: Numbers of each caste, f64, which hooks read as `a.NAME`: functions of a task and
             a caste.
         fixed: Functions of a caste whose results cannot change in an episode, by words for them.
+        columns: A function of a colony that returns the arrays (W, ants) of ants that start, where
+            these are not 0.
+        constants: A function of a colony that returns further arrays of its kernels.
         faults: A function of a task that yields what is wrong with it, as sentences.
         example: Settings of a task that uses the feature.
         measures: Its measures by name.
@@ -135,6 +139,8 @@ class Feature:
     probabilities: tuple[str, ...] = ()
     of_castes: Mapping[str, Callable[[Task, Caste], float]] = field(default_factory=dict)
     fixed: Mapping[str, Callable[[Caste], Any]] = field(default_factory=dict)
+    columns: Callable[[State], Mapping[str, Any]] = lambda state: {}
+    constants: Callable[[State], Mapping[str, Any]] = lambda state: {}
     faults: Callable[[Task], Iterator[str]] = lambda task: iter(())
     example: Mapping[str, Any] = field(default_factory=dict)
     measures: Mapping[str, Measured] = field(default_factory=dict)
@@ -145,7 +151,7 @@ class Feature:
     @property
     def group(self) -> str:
         """The name of its group of settings in a task."""
-        return self.settings.path.rpartition(".")[2]
+        return self.settings.path.split(".")[1]
 
     @property
     def name(self) -> str:

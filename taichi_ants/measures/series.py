@@ -83,7 +83,8 @@ class Recorder:
                 continue
             self._read[world] = tick
             snapshot, values = colony.snapshot(world), dict[str, Value]()
-            for array in (*vars(snapshot).values(), *snapshot.fields.values()):
+            named = (snapshot.fields, snapshot.of_ants)
+            for array in (*vars(snapshot).values(), *(a for one in named for a in one.values())):
                 if isinstance(array, np.ndarray):  # all measures of the row read it
                     array.setflags(write=False)
             for name, source in self._sources.items():

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.castes import lays
 from taichi_ants.reference.features import inputs_of
+from taichi_ants.reference.features.castes import lays
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick

@@ -20,15 +20,15 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import frozen_policy
 from taichi_ants.reference.actions import Intent, carry_out, intend
 from taichi_ants.reference.ants import Ant, Transition, nest_of, starts
-from taichi_ants.reference.castes import (
+from taichi_ants.reference.choice import choose_action, choose_cell
+from taichi_ants.reference.features import hooks
+from taichi_ants.reference.features.castes import (
     caste_of,
     castes_at_start,
     draw_caste,
     draw_trait,
     epsilon_of,
 )
-from taichi_ants.reference.choice import choose_action, choose_cell
-from taichi_ants.reference.features import hooks
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS, learn_together

@@ -11,8 +11,8 @@ import numpy as np
 import taichi_ants.interventions as language
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_INTERVENTION
 from taichi_ants.reference.ants import Ant, start_order
-from taichi_ants.reference.castes import draw_caste
 from taichi_ants.reference.colony import ReferenceColony
+from taichi_ants.reference.features.castes import draw_caste
 from taichi_ants.reference.geometry import (
     Cell,
     distance,

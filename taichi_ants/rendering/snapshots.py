@@ -6,8 +6,7 @@ A colony of one ant replays an episode, so pictures show the engine's own steps.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from dataclasses import fields as dataclass_fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -169,8 +168,7 @@ def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
         return snapshot, Status(tuple(lines))
     # Pictures mark the view of the first ant, so the followed ant must be first.
     order = np.argsort(~followed, kind="stable")
-    of_ants = [array.name for array in dataclass_fields(snapshot) if array.name.startswith("ant_")]
-    snapshot = replace(snapshot, **{name: getattr(snapshot, name)[order] for name in of_ants})
+    snapshot = snapshot.ordered(order)
     # All lines together do not fit into the panel.
     lines = [lines[0], lines[3], ("ant", str(follow))]
     slot, table = int(slots[order[0]]), colony.q_values[0]

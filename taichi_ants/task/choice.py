@@ -7,17 +7,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
+from taichi_ants.features.castes import Attraction, Exponent, Temperature
 from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import Rule
 from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
     import numpy as np
-
-
-Temperature = Annotated[float | None, Setting(least=1e-6, most=1e6)]
-Attraction = Annotated[float | None, Setting(least=0.001, most=1e6)]
-Exponent = Annotated[float | None, Setting(least=0, most=20)]
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 from taichi_ants.errors import shown
 from taichi_ants.features import FEATURES, feature_of_input, probabilities, used_by
+from taichi_ants.features.castes import ALL, NOTHING, Caste, shares_in
 from taichi_ants.features.labour import Labour
 from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
@@ -18,7 +19,6 @@ from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import Parameters, Rule
 from taichi_ants.settings import Named, Setting, Settings, declared
 from taichi_ants.task import observations
-from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
 from taichi_ants.task.choice import Choice
 from taichi_ants.task.field import COMPASS, TRAIL, Field
 from taichi_ants.task.food import Food

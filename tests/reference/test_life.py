@@ -42,7 +42,7 @@ def test_a_food_given_becomes_an_ant_that_faces_away(seed):
         neighbour(QUEEN, heading),
         heading,
     )
-    assert (born.carries, born.own["age"], born.action, born.reward) == (False, 0, -1, 0)
+    assert (born.carries, born.own.get("age", 0), born.action, born.reward) == (False, 0, -1, 0)
     assert born.state == observe(colony.world, born)
     assert born.stream.state == stream_state(seed, STREAM_BORN, 1)
     assert colony.stores[0] == 0

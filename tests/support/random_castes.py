@@ -9,8 +9,8 @@ import numpy as np
 from random_colonies import RandomColony
 
 from taichi_ants import AntsError
+from taichi_ants.features.castes import numbers_in
 from taichi_ants.task import Labour, Threshold
-from taichi_ants.task.caste import numbers_in
 
 
 def with_castes(

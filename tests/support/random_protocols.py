@@ -137,7 +137,7 @@ def _change(rng: np.random.Generator, task: Task) -> dict[str, Any]:
         able.append((f"castes.{name}.lays", str(rng.choice(["all", "none", "trail"]))))
         if caste.threshold.value is not None:
             able.append((f"castes.{name}.threshold.value", float(rng.uniform(3, 9))))
-    if task.labour.divides:
+    if task.labour.rule != "none":
         able.append(("labour.demand", float(rng.uniform(0, 4))))
     if life.pile_move_interval:
         able += [("life.pile_move_interval", int(rng.integers(1, 9))), ("life.regrowth", 2)]

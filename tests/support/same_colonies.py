@@ -49,7 +49,9 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
         assert column.tolist() == [getattr(ant, name) for ant in theirs], name
     for _, array in features.arrays(ANT):
         column = getattr(colony, array.view)[world, slots]
-        expected = np.array([ant.own.get(array.name, 0) for ant in theirs], column.dtype)
+        expected = np.array(
+            [ant.own.get(array.name, getattr(ant, array.name, 0)) for ant in theirs], column.dtype
+        )
         assert np.array_equal(column, expected), array.name
     executed, rewards = colony.executed[world, slots], colony.rewards[world, slots]
     for action, reward, ant in zip(executed.tolist(), rewards.tolist(), theirs, strict=True):

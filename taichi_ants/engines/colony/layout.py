@@ -53,7 +53,6 @@ COLUMNS = {
     "nest": Column(np.int8, 0, lambda model: model.n_nests > 1),
     # The kind of the last food that it picked up.
     "kind": Column(np.int8, 0, lambda model: model.n_kinds > 1),
-    "caste": Column(np.int8, 0, lambda model: model.n_castes > 0),
     **{
         array.name: Column(np.dtype(array.dtype).type, 0, partial(_uses, feature))
         for feature, array in arrays(ANT)

@@ -45,7 +45,7 @@ from taichi_ants.errors import (
     shown,
 )
 from taichi_ants.features import arrays, numbers_of_castes, used_by
-from taichi_ants.features.feature import ANT, NEST, Array
+from taichi_ants.features.feature import ANT, CASTE, NEST, Array
 from taichi_ants.features.support import BASE, CASTES, COLONY, refuse_unsupported
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
@@ -55,8 +55,7 @@ from taichi_ants.learners.learner import Memory
 from taichi_ants.learners.policies import check_finite, checked_values, frozen_policy
 from taichi_ants.records import Snapshot, same
 from taichi_ants.task import Task
-from taichi_ants.task.caste import chances_in, numbers_in
-from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, N_ACTIONS, OBSTACLE, ROW
+from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
 from taichi_ants.task.model import Model
@@ -269,8 +268,7 @@ class ColonyState:
     next_actions, streams = column("next_action"), column("streams")
     _stages, _loads, _states = column("stage"), column("carries"), column("state")
     _executed, _carried, _kinds = column("executed"), column("carried"), column("kind")
-    # Copies (W, capacity) of the nest and the caste of the last ant in each slot, int32.
-    nests, castes = column("nest", np.int32), column("caste", np.int32)
+    nests = column("nest", np.int32)  # a copy (W, capacity) of those of the last ant in each slot
 
     @property
     def living(self) -> np.ndarray:
@@ -337,6 +335,11 @@ class ColonyState:
         axes = {"nest": self.n_nests, "caste": self.model.n_groups // self.n_nests}
         several = {name: n for name, n in axes.items() if n > 1}
         return {"slot": self.capacity} if self.one_a_slot else several
+
+    @property
+    def _numbers_of(self) -> dict[str, int]:
+        """The numbers of nests and castes in each world."""
+        return {NEST: self.n_nests, CASTE: self.model.n_castes}
 
     @property
     def owners(self) -> int:
@@ -423,7 +426,6 @@ class ColonyState:
             ant_foods=np.where(carries, of_ants, np.int32(-1)),
             food_kinds=of_cells,
             queens=queens.astype(np.int32),
-            ant_castes=self.castes[world, living],
             of_ants={view: getattr(self, view)[world, living] for view in OF_ANTS},
             fields=fields,
             counts=counts,
@@ -609,12 +611,9 @@ class ColonyState:
         }
         if model.n_nests > 1:
             self.first["nest"] = nests.astype(np.int8)
-        if model.n_castes:
-            self.first["caste"] = castes = np.zeros(cells.shape, np.int8)
-            for w, nest in np.ndindex(len(worlds), self.n_nests):
-                ours = nests[w] == nest
-                numbers = numbers_in(self.task.castes, nest, int(ours.sum()))
-                castes[w, ours] = np.repeat(np.arange(len(numbers)), numbers)
+        self.nests_at_start = nests
+        for feature in model.features:
+            self.first |= feature.columns(self)
         ground = self._of_each(World.ground)
         loads = np.array([food.loads for food in self.task.foods.values()] or [1], np.int32)
         kinds = self._of_each(World.kinds_by_cell)
@@ -631,7 +630,6 @@ class ColonyState:
         of_nests = np.zeros((len(NestRow), len(worlds) * self.n_nests), np.int32)
         queens = self._of_each(lambda world: world.grid.index(world.queens))
         of_nests[NestRow.QUEEN_CELL] = queens.reshape(-1)
-        by_caste = {"caste_deliveries": np.zeros(len(worlds) * model.n_castes, np.int32)}
         foods = [food_sources.at_start(world) for world in worlds] if n_food_sources else []
         self.at_start = {
             # The ground of each cell, and the mark of the ant on it, see `layout`.
@@ -646,11 +644,11 @@ class ColonyState:
             "kind_of": kinds.reshape(-1) if self.n_kinds > 1 else np.zeros(1, np.uint8),
             "loads": loads.reshape(-1) if model.has_loads else np.zeros(1, np.int32),
             "deliveries_by_nest_and_kind": np.zeros(of_nests.shape[1] * self.n_kinds, np.int32),
-            **(by_caste if model.n_castes else {}),
             **{
-                array.name: np.zeros(of_nests.shape[1])
-                for feature, array in arrays(NEST)
-                if feature in model.features
+                array.name: np.zeros(len(worlds) * self._numbers_of[array.per], array.dtype)
+                for feature in model.features
+                for array in feature.arrays
+                if array.per != ANT
             },
             # Sums over all ants in this episode, see `Tally`.
             "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
@@ -783,23 +781,15 @@ class ColonyState:
             rates = [caste.learning_rate or 0.0 for caste in task.castes.values()]
             weights = [update_weights(rate, most) for rate in rates]
             longest = max(map(len, weights))
-            chances = []
-            nests = self.first.get("nest", np.zeros((len(self.seeds), self.ants)))
-            for w, nest in np.ndindex(len(self.seeds), self.n_nests):
-                n = int(np.count_nonzero(nests[w] == nest))
-                chances.append(np.cumsum(chances_in(task.castes, nest, n)))
             settings |= {
-                "castes": _caste_numbers(task, self.training.discount),
+                "castes": _caste_numbers(task),
                 # By caste and n, see `update_weights`; unused without an own learning rate.
                 "caste_weights": np.stack(
                     [np.pad(one, (0, longest - len(one)), mode="edge") for one in weights]
                 ),
-                # By world, nest and caste: cumulative probabilities of the castes of newborn ants.
-                "caste_chances": np.concatenate(chances),
-                "delivered_by_caste": np.zeros(
-                    len(self.seeds) * self.chunks * MAX_CASTES, np.int32
-                ),
             }
+        for feature in self.model.features:
+            settings |= feature.constants(self)
         if task.rules:  # the parameters of your own rules
             settings["rule_numbers"] = np.array([*rules, 0.0], np.float64)
         return {
@@ -931,27 +921,12 @@ def _food_numbers(task: Task) -> np.ndarray:
     return numbers
 
 
-def _caste_numbers(task: Task, discount: float) -> np.ndarray:
+def _caste_numbers(task: Task) -> np.ndarray:
     """Return the numbers of the castes, float64 (rows, castes); see `CasteRow`."""
-    pheromones, cues, own = (TRAIL, *task.fields), task.all_cues, numbers_of_castes(used_by(task))
-    numbers = np.zeros((len(CasteRow) + len(own), len(task.castes)))
-    for k, caste in enumerate(task.castes.values()):
-        numbers[:, k] = (
-            _or(caste.epsilon, -1.0),
-            _or(caste.epsilon_spread, 0.0),
-            _or(caste.learning_rate, -1.0),
-            _or(caste.discount, discount),
-            *map(_or, (caste.temperature, caste.k, caste.exponent), task.choice.numbers()),
-            caste.policy is None,
-            sum(1 << pheromones.index(name) for name in set(caste.pheromones_laid(pheromones))),
-            cues.index(task.cues_of(caste)),
-            *(of(task, caste) for of in own.values()),
-        )
-    return numbers
-
-
-def _or(number: float | None, default: float) -> float:
-    return default if number is None else number
+    of_castes = numbers_of_castes(used_by(task)).values()
+    return np.array(
+        [[of(task, caste) for caste in task.castes.values()] for of in of_castes], float
+    )
 
 
 def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -> tuple[World, ...]:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from taichi.lang.impl import subscript
 
 from taichi_ants.engines.colony import columns
-from taichi_ants.engines.colony.layout import COLUMNS, CasteRow, NestRow, WorldRow
+from taichi_ants.engines.colony.layout import COLUMNS, NestRow, WorldRow
 from taichi_ants.engines.own_rules import for_kernels
 from taichi_ants.features import numbers_of_castes
 from taichi_ants.features.feature import NEST
@@ -43,10 +43,7 @@ def names_of(model: Model) -> Names:
             "seed": Entry("seeds", WORLD),
             **{row.name.lower(): Entry("worlds", WORLD, row) for row in WorldRow},
             **{row.name.lower(): Entry("nests", NEST, row) for row in NestRow},
-            **{
-                name: Entry("castes", CASTE, row)
-                for row, name in enumerate(of_castes, start=len(CasteRow))
-            },
+            **{name: Entry("castes", CASTE, row) for row, name in enumerate(of_castes)},
             **{
                 array.name: Entry(array.name, array.per)
                 for feature in used

@@ -8,7 +8,7 @@ import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_TRAIT
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.castes import caste_of
+from taichi_ants.reference.features.castes import caste_of
 from taichi_ants.reference.geometry import neighbour
 from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.rules.functions import exp, log, power

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.castes import caste_of
+from taichi_ants.reference.features.castes import caste_of
 
 ReferenceColony = Any  # which imports this file
 

@@ -8,10 +8,10 @@ from scipy.stats import kstest, lognorm, truncnorm, uniform
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, task, worlds
 from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.features.castes import chances_in, numbers_in
 from taichi_ants.interventions import SetTask
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
 from taichi_ants.task import Labour, Threshold
-from taichi_ants.task.caste import chances_in, numbers_in
 from taichi_ants.task.events import Event
 
 TRAINING = TrainingConfig("q_learning", 0.5, 0.9, 0.1, 1.0)
@@ -167,7 +167,7 @@ def test_numbers_of_castes_change_in_an_episode():
     interventions.apply(SetTask((("labour.demand", 2.0),)))
     assert colony.arrays["labour"][0] == 2.0
     for name, fixed in (("share", 0.25), ("policy", "random"), ("threshold", Threshold())):
-        with pytest.raises(AntsError, match="cannot change the share, ants, nest or policy"):
+        with pytest.raises(AntsError, match="cannot change its share, ants, nest or policy"):
             interventions.apply(SetTask(((f"castes.a.{name}", fixed),)))
 
 

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
+
+import numpy as np
 
 from taichi_ants.errors import AntsError
-from taichi_ants.features import FEATURES
+from taichi_ants.features.feature import ANT, CASTE, Array, Feature, State, Task
 from taichi_ants.features.labour import Threshold
 from taichi_ants.features.life import Ticks
 from taichi_ants.settings import Setting, Settings
-from taichi_ants.task.choice import Attraction, Exponent, Temperature
-from taichi_ants.task.constants import MAX_CASTES, MAX_NESTS
 
+TRAIL = "trail"
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
+MAX_CASTES, MAX_NESTS = 16, 7
 Rate = Annotated[float | None, Setting(least=0, most=1)]
 Number = Annotated[int | None, Setting(least=0)]
+Temperature = Annotated[float | None, Setting(least=1e-6, most=1e6)]
+Attraction = Annotated[float | None, Setting(least=0.001, most=1e6)]
+Exponent = Annotated[float | None, Setting(least=0, most=20)]
 
 
 @dataclass(frozen=True, repr=False)
@@ -85,13 +90,6 @@ class Caste(Settings, path="task.castes.NAME"):
                 f"`{path}.epsilon_spread` is {spread}; with `epsilon` {epsilon} it must be at most "
                 f"{min(epsilon, 1 - epsilon):g}, because rates lie between 0 and 1."
             )
-
-    @property
-    def fixed(self) -> tuple[Any, ...]:
-        """The settings that cannot change in an episode."""
-        of_features = (of(self) for feature in FEATURES for of in feature.fixed.values())
-        varies = bool(self.epsilon_spread)
-        return self.share, self.ants, self.nest, self.policy, varies, *of_features
 
     def pheromones_laid(self, names: Sequence[str]) -> list[str]:
         """Return the pheromones that the ants lay, of those with these names."""
@@ -165,3 +163,81 @@ def chances_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[float]:
     shares, fixed, most = shares_in(castes, nest), _fixed_in(castes, nest), max(n, 1)
     rest = (n - sum(fixed)) / most if n else 1.0
     return [ants / most + share * rest for ants, share in zip(fixed, shares, strict=True)]
+
+
+def _columns(state: State) -> dict[str, np.ndarray]:
+    """Return the caste of each ant that starts, int8 (W, ants)."""
+    nests = state.nests_at_start
+    castes = np.zeros(nests.shape, np.int8)
+    for w, nest in np.ndindex(len(nests), state.n_nests):
+        ours = nests[w] == nest
+        numbers = numbers_in(state.task.castes, nest, int(ours.sum()))
+        castes[w, ours] = np.repeat(np.arange(len(numbers)), numbers)
+    return {"caste": castes}
+
+
+def _constants(state: State) -> dict[str, np.ndarray]:
+    """Return the probabilities of the castes of newborn ants, and scratch counts of deliveries."""
+    nests, chances = state.nests_at_start, []
+    for w, nest in np.ndindex(len(nests), state.n_nests):
+        n = int(np.count_nonzero(nests[w] == nest))
+        chances.append(np.cumsum(chances_in(state.task.castes, nest, n)))
+    return {
+        # By world, nest and caste: cumulative.
+        "caste_chances": np.concatenate(chances),
+        "delivered_by_caste": np.zeros(len(nests) * state.chunks * MAX_CASTES, np.int32),
+    }
+
+
+def _lays(task: Task, caste: Caste) -> int:
+    """Return a bit for each pheromone that the ants of a caste lay."""
+    names = (TRAIL, *task.fields)
+    return sum(1 << names.index(name) for name in set(caste.pheromones_laid(names)))
+
+
+def _of_choice(name: str) -> Callable[[Task, Caste], float]:
+    def of(task: Task, caste: Caste) -> float:
+        own = getattr(caste, name)
+        return (getattr(task.choice, name) or 0.0) if own is None else own
+
+    return of
+
+
+def _own(name: str) -> Callable[[Task, Caste], float]:
+    """Return a function of the number of a caste, -1 if it has that of the colony."""
+
+    def of(task: Task, caste: Caste) -> float:
+        own = getattr(caste, name)
+        return -1.0 if own is None else own
+
+    return of
+
+
+CASTES = Feature(
+    Caste,
+    uses=lambda task: bool(task.castes),
+    arrays=(
+        Array("caste", ANT, "i1", "castes", "i4"),
+        Array("caste_deliveries", CASTE, "i4", "caste_deliveries", "i4", unit="items"),
+    ),
+    of_castes={
+        "epsilon": _own("epsilon"),
+        "epsilon_spread": lambda task, caste: caste.epsilon_spread or 0.0,
+        "learning_rate": _own("learning_rate"),
+        "discount": _own("discount"),
+        "temperature": _of_choice("temperature"),
+        "k": _of_choice("k"),
+        "exponent": _of_choice("exponent"),
+        "learns": lambda task, caste: caste.policy is None,
+        "lays": _lays,
+        "cues": lambda task, caste: task.all_cues.index(task.cues_of(caste)),
+    },
+    fixed={
+        "its share, ants, nest or policy": lambda caste: (
+            *(caste.share, caste.ants, caste.nest, caste.policy),
+            bool(caste.epsilon_spread),
+        )
+    },
+    columns=_columns,
+    constants=_constants,
+)
