@@ -113,7 +113,7 @@ class Feature:
         kills: Whether ants can die by it, so that slots become vacant.
         runs_alone: Whether lone ants have the feature, too.
         arrays: The arrays that it adds to the state of a colony.
-        numbers: Settings that hooks read as `a.GROUP.SETTING`, f64.
+        numbers: Settings that hooks read as `a.task.GROUP.SETTING`, f64.
         probabilities: Settings that hooks read as `a.SETTING_below`: a bound of random words, u64.
         of_castes: Numbers of each caste, f64, which hooks read as `a.NAME`: functions of a task and
             a caste.

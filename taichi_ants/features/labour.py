@@ -231,7 +231,7 @@ def choose(a, stream):
         if stimulus > 0.0:
             ratio, raised = ti.cast(a.threshold, ti.f64) / stimulus, ti.f64(0.0)
             if ratio > 0.0:
-                raised = numbers.power(ratio, a.labour.exponent)
+                raised = numbers.power(ratio, a.task.labour.exponent)
             chance = 1.0 / (1.0 + raised)
         if bits.high_word(bits.bits_of(after)) < ti.cast(chance * 4294967296.0, ti.u64):
             idle = 0
@@ -248,7 +248,7 @@ def rests(a):
 @LABOUR.hook
 def delivered(nest, n):
     """Lower the stimulus of a nest."""
-    lowered = nest.stimulus - nest.labour.relief * ti.cast(n, ti.f64)
+    lowered = nest.stimulus - nest.task.labour.relief * ti.cast(n, ti.f64)
     nest.stimulus = ti.select(lowered > 0.0, lowered, ti.f64(0.0))
 
 
@@ -276,7 +276,7 @@ def stopped(a):
 @LABOUR.hook
 def tick_ended(nest):
     """Raise the stimulus of a nest."""
-    nest.stimulus = nest.stimulus + nest.labour.demand
+    nest.stimulus = nest.stimulus + nest.task.labour.demand
 
 
 @LABOUR.input("response threshold of the ant, 0 without one")

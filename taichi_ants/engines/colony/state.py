@@ -775,7 +775,7 @@ class ColonyState:
         for feature in self.model.features:
             if feature.numbers:
                 values = (getattr(feature.of(task), name) for name in feature.numbers)
-                settings[feature.group] = np.array([value or 0.0 for value in values])
+                settings[f"{feature.group}_numbers"] = np.array([value or 0.0 for value in values])
         if task.castes:
             most = self.capacity if self.sharing == "shared" else 1
             rates = [caste.learning_rate or 0.0 for caste in task.castes.values()]

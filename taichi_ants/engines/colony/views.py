@@ -58,8 +58,8 @@ class View:
     """An ant or a nest of a world, while a kernel compiles.
 
     An attribute is an entry of an array, which can be assigned: by the slot of the ant, or by its
-    nest, world or caste. The name of a feature has the numbers of that feature as attributes. Other
-    names are those of the arrays and numbers of kernels.
+    nest, world or caste. `task` has the settings that features declare as numbers, for example
+    `task.labour.demand`. Other names are those of the arrays and numbers of kernels.
     """
 
     _data_oriented = True  # Taichi requires it of objects whose attributes kernels read
@@ -71,8 +71,8 @@ class View:
         if name.startswith("_"):  # of Python
             raise AttributeError(name)
         c, names = self._c, self._v.names
-        if name in names.numbers:
-            return Numbers(getattr(c, name), names.numbers[name])
+        if name == "task":
+            return TaskNumbers(c, names.numbers)
         if name not in names.entries:
             return getattr(c, name)
         array, per, row = names.entries[name]
@@ -92,8 +92,22 @@ class View:
         return self._w * v.n_nests + nest
 
 
+class TaskNumbers:
+    """The settings of a task that hooks read, while a kernel compiles: its attributes are groups."""
+
+    _data_oriented = True
+
+    def __init__(self, c: Any, names: Mapping[str, tuple[str, ...]]) -> None:
+        self._c, self._names = c, names
+
+    def __getattr__(self, group: str) -> Any:
+        if group not in self._names:
+            raise AttributeError(group)
+        return Numbers(getattr(self._c, f"{group}_numbers"), self._names[group])
+
+
 class Numbers:
-    """The numbers of a feature, while a kernel compiles."""
+    """The numbers of a group of settings, while a kernel compiles."""
 
     _data_oriented = True
 

@@ -165,7 +165,7 @@ def test_numbers_of_castes_change_in_an_episode():
     interventions.apply(SetTask((("castes.a.lifespan", None), ("castes.a.epsilon", 1.0))))
     assert colony.arrays["castes"][0].tolist() == [1.0, -1.0]
     interventions.apply(SetTask((("labour.demand", 2.0),)))
-    assert colony.arrays["labour"][0] == 2.0
+    assert colony.arrays["labour_numbers"][0] == 2.0
     for name, fixed in (("share", 0.25), ("policy", "random"), ("threshold", Threshold())):
         with pytest.raises(AntsError, match="cannot change its share, ants, nest or policy"):
             interventions.apply(SetTask(((f"castes.a.{name}", fixed),)))
