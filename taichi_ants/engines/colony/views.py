@@ -93,7 +93,7 @@ class View:
 
 
 class TaskNumbers:
-    """The settings of a task that hooks read, while a kernel compiles: its attributes are groups."""
+    """The groups of settings of a task that hooks read, while a kernel compiles."""
 
     _data_oriented = True
 
