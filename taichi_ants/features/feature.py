@@ -35,7 +35,8 @@ class Array(NamedTuple):
         dtype: The type in kernels; "i1", "i4" or "f4" per ant.
         view: Its name as an attribute of a colony, and of a snapshot with "ant_" in front.
         shown_as: The type there.
-        values, unit: The words of the description of a model.
+        words, values, unit: The name, the values and the unit in the description of a model, which
+            leaves out arrays without a name.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Array(NamedTuple):
     dtype: str
     view: str
     shown_as: str
+    words: str = ""
     values: str = "at least 0"
     unit: str = ""
 

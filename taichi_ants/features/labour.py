@@ -167,9 +167,17 @@ def _foraging(snapshot: Any) -> float:
 LABOUR = Feature(
     Labour,
     arrays=(
-        Array("idle", ANT, "i1", "idle", "bool", "yes, no"),
-        Array("threshold", ANT, "f4", "thresholds", "f4", unit="units of stimulus"),
-        Array("stimulus", NEST, "f8", "stimuli", "f8", unit="units of stimulus"),
+        Array("idle", ANT, "i1", "idle", "bool", "idle", "yes, no"),
+        Array(
+            "threshold",
+            ANT,
+            "f4",
+            "thresholds",
+            "f4",
+            "response threshold",
+            unit="units of stimulus",
+        ),
+        Array("stimulus", NEST, "f8", "stimuli", "f8", "stimulus", unit="units of stimulus"),
     ),
     numbers=("demand", "relief", "exponent"),
     of_castes={

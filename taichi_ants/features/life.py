@@ -45,7 +45,7 @@ AGE = Feature(
     switch="lifespan",
     uses=_ages,
     kills=True,
-    arrays=(Array("age", ANT, "i4", "ages", "i4", unit="ticks"),),
+    arrays=(Array("age", ANT, "i4", "ages", "i4", "age", unit="ticks"),),
     of_castes={"lifespan": lambda task, caste: caste.lifespan or task.life.lifespan or -1},
 )
 

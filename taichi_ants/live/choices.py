@@ -15,12 +15,13 @@ import numpy as np
 
 from taichi_ants import learners, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect
+from taichi_ants.features import FEATURES
 from taichi_ants.features.support import refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
 from taichi_ants.live.setup import FORM_SUPPORTS, MOST_ANTS, MOST_TEXT, Setup
 from taichi_ants.settings import MISSING, DeclaredSetting, Named, all_of, declared, flat, nested
-from taichi_ants.task import Labour, Task, observations
+from taichi_ants.task import Task, observations
 
 WORLDS = {
     "paper": "the paper's world",
@@ -42,6 +43,10 @@ _LEARNING: dict[str, Any] = {
 }
 
 
+# The page has no castes, which some features require.
+_OF_CASTES = tuple(f"task.{feature.group}." for feature in FEATURES if "castes" in feature.example)
+
+
 def fields() -> Iterator[dict[str, Any]]:
     """Yield the fields of the form, JSON-compatible.
 
@@ -49,9 +54,8 @@ def fields() -> Iterator[dict[str, Any]]:
     "default". "only" (a path and its values), "world" and "learner" limit a field to these.
     """
     for setting in all_of(Task):
-        # The page has no castes, which labour requires.
         has_no_field = setting.is_group or setting.is_text or setting.kind is Named
-        if not has_no_field and not setting.path.startswith(f"{Labour.path}."):
+        if not has_no_field and not setting.path.startswith(_OF_CASTES):
             yield _field(setting)
     for setting in declared(TrainingConfig)[1:]:
         default = _LEARNING.get(setting.name, setting.default)

@@ -121,8 +121,8 @@ class Dataset(Record):
     def returns(self, discount: float = 1.0) -> np.ndarray:
         """Return the discounted return of each episode from its first step, float64 (e,)."""
         discount = checked_share("discount", discount)
-        ages = np.arange(len(self)) - self.begins[self.episode]
-        return np.bincount(self.episode, weights=discount**ages * self.reward)
+        steps = np.arange(len(self)) - self.begins[self.episode]
+        return np.bincount(self.episode, weights=discount**steps * self.reward)
 
     def first(self, transitions: int) -> Dataset:
         """Return the first transitions of each run; a cut episode is truncated."""

@@ -15,6 +15,8 @@ from typing import Any
 from taichi_ants import files, learners
 from taichi_ants.analysis.tables import Table
 from taichi_ants.errors import AntsError
+from taichi_ants.features import FEATURES
+from taichi_ants.features.feature import Feature
 from taichi_ants.measures import finished
 from taichi_ants.settings import DeclaredSetting, declared, flat
 from taichi_ants.studies.folder import INPUTS, asked_in, checksum_of
@@ -121,6 +123,22 @@ class Model:
         other, *needed = setting.rule.only
         return row.get(f"{group}.{other}") in needed
 
+    def uses_feature(self, feature: Feature) -> bool:
+        """Return whether a point uses a feature: a setting of its group differs from the default.
+
+        If the feature has a switch, it is that setting, of the group or of a caste.
+        """
+        path = re.escape(f"task.{feature.group}.")
+        if feature.switch:
+            path = rf"({path}|task\.castes\.\w+\.){feature.switch}$"
+        of_group = [
+            (value, self.declaration(name, row))
+            for row in self.rows
+            for name, value in row.items()
+            if re.match(path, name)
+        ]
+        return any(setting is None or value != setting.default for value, setting in of_group)
+
     def parameters(self) -> list[Row]:
         """Return the names, values, units and meanings of all settings that have an effect."""
         vary = self.settings.get("vary") or [{"world_kinds": self.settings.get("world_kinds")}]
@@ -170,21 +188,24 @@ class Model:
         names = {row["task.observation"] for row in self.rows} & {*observations.names()}
         states = sorted(observations.get(name).n_states for name in names)
         number, foods, castes = "at least 0", self.entries("foods"), self.entries("castes")
-        divides, levels = "task.labour.demand" in text, ["trail", *self.entries("fields")]
-        ages = "yes" in text.get("task.life.births", "") or any("lifespan" in name for name in text)
+        levels = ["trail", *self.entries("fields")]
+        of_features = {
+            (array.per, array.words, array.values, array.unit): self.uses_feature(feature)
+            for feature in FEATURES
+            for array in feature.arrays
+            if array.words
+        }
         rows = {
             ("cell", "content", "empty, rock, food, queen", ""): True,
             **{("cell", f"level of `{level}`", number, "level"): True for level in levels},
             ("cell", "food", number, "loads"): foods,
             ("nest", "food received", number, "items"): True,
-            ("nest", "stimulus", number, "units of stimulus"): divides,
             ("ant", "cell", "", ""): True,
             ("ant", "heading", "0 to 5, clockwise; 0 is up", "60 degrees"): True,
             ("ant", "has food", "yes, no", ""): True,
             ("ant", "observation", f"one of {_several(states)} states", ""): states,
             ("ant", "caste", ", ".join(castes), ""): castes,
-            ("ant", "idle", "yes, no", ""): divides,
-            ("ant", "age", number, "ticks"): ages,
+            **of_features,
             ("ant", "time since its load changed", number, "ticks"): any(
                 name.endswith(".slope") for name in text
             ),

@@ -51,7 +51,7 @@ class Variant:
     def __init__(self, model: Model) -> None:
         vars(self).update(vars(model))
         # The mark of an ant that wants no other cell.
-        self.idle = STANDS if model.traffic.shared else 0
+        self.mark_of_rest = STANDS if model.traffic.shared else 0
         # The hooks of features at each point, in their order.
         self.at = hooks_at(model.features)
         self.can_rest = bool(self.at["rests"])

@@ -513,7 +513,7 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         enters |= ti.cast(holds_nestmate(c, v, ant, w * c.size + cell + step), ti.i32)
     enters &= MOVES >> action
     wanted = cell + enters * step
-    mark = v.idle + enters * (conflicts.ENTER + heading - v.idle)
+    mark = v.mark_of_rest + enters * (conflicts.ENTER + heading - v.mark_of_rest)
     foods = vision.goals_in_view(paper_state) * (1 - carries)  # no branch by `carries`
     if (foods != 0) & (action == PICK_UP):
         position = lowest_bit_number(foods)
