@@ -15,6 +15,8 @@ from functools import cached_property
 from importlib import import_module
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from taichi_ants.features.points import POINTS
 from taichi_ants.settings import Settings
 
@@ -47,6 +49,27 @@ class Array(NamedTuple):
     words: str = ""
     values: str = "at least 0"
     unit: str = ""
+
+
+class Mark(NamedTuple):
+    """How pages show an array of the ants: those of which it is true, or small, look faded.
+
+    Attributes:
+        view: The view of the array.
+        words: The words in the legend and at an ant.
+        most: The setting of the feature with the value at which ants are not faded; "" if the array
+            is true or false.
+    """
+
+    view: str
+    words: str
+    most: str = ""
+
+    def fades(self, values: np.ndarray, settings: Any) -> np.ndarray:
+        """Return how faded ants are, uint8 (n,), from 0 to 255 for true, or for 0."""
+        most = getattr(settings, self.most) if self.most else None
+        shares = values if most is None else 1.0 - np.clip(values / most, 0.0, 1.0)
+        return np.rint(255 * shares).astype(np.uint8)
 
 
 class Measured(NamedTuple):
@@ -126,6 +149,7 @@ class Feature:
         faults: A function of a task that yields what is wrong with it, as sentences.
         example: Settings of a task that uses the feature.
         measures: Its measures by name.
+        marks: What pages show of its arrays of ants.
         hooks: Its hooks by the names of points.
         inputs: Inputs of your rules by name, with the functions of an ant that return them.
         by_deliveries: The inputs that change with the deliveries of a tick before ants observe.
@@ -146,6 +170,7 @@ class Feature:
     faults: Callable[[Task], Iterator[str]] = lambda task: iter(())
     example: Mapping[str, Any] = field(default_factory=dict)
     measures: Mapping[str, Measured] = field(default_factory=dict)
+    marks: tuple[Mark, ...] = ()
     hooks: dict[str, KernelFunction] = field(default_factory=dict)
     inputs: dict[str, tuple[Input, KernelFunction]] = field(default_factory=dict)
     by_deliveries: set[str] = field(default_factory=set)

@@ -33,6 +33,7 @@ from taichi_ants.features.feature import (
     NEST,
     Array,
     Feature,
+    Mark,
     Measured,
     Task,
     bits,
@@ -194,6 +195,7 @@ LABOUR = Feature(
         "labour": "thresholds",
         "castes": {"ants": {"threshold": {"distribution": "uniform", "value": 5.0, "spread": 5.0}}},
     },
+    marks=(Mark("idle", "idle"),),
     measures={
         "foraging": Measured(_foraging, "", "share of the ants that forage, which are not idle")
     },

@@ -42,13 +42,14 @@ SECTIONS = {
     "numbers": "i4",
     "cells": "cell",
     "poses": "u1",  # the heading, plus 8 with food, plus 16 times the nest
-    # The caste, plus 16 times the kind of the food that the ant carries, plus 128 if it is idle;
-    # empty without castes and with one kind of food.
+    # The caste, plus 16 times the kind of the food that the ant carries; empty without castes and
+    # with one kind of food.
     "groups": "u1",
+    "marks": "u1",  # how faded all ants are by the first mark, 0 to 255, then by the next ones
     "states": "state",
     # Actions of the ants of the previous frame; empty unless exactly one tick has passed.
-    "acts": "u1",  # the executed action, or 15 of an idle ant, plus 16 times the event
-    "choices": "u1",  # the chosen action, plus 8 if it was drawn one tick earlier; 15 if idle
+    "acts": "u1",  # the executed action, or 15 of an ant that rests, plus 16 times the event
+    "choices": "u1",  # the chosen action, plus 8 if it was drawn one tick earlier; 15 if it rests
     "rewards": "f4",  # of these actions
     "td_errors": "f4",  # NaN where unknown; empty if no ant learns
     # Changes since the previous frame: indices and new values.

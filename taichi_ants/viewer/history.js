@@ -16,7 +16,7 @@
    A frame is an ArrayBuffer, or a view of one. */
 
 const EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13; // contents of a cell, as in task/constants.py
-const N_ACTIONS = 5, IDLE = 15; // IDLE is the action of an idle ant in frames
+const N_ACTIONS = 5, RESTS = 15; // RESTS is the action of an ant that rests in frames
 const MOST_BYTES = 2 ** 27; // bytes of stored frames; a live simulation has more after some hours
 const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants", "delivered", "ticks", "trailClock"];
 const POINT = ["episode", "ticks", "delivered", "returns", "epsilon", "ended"]; // as in frames.py
@@ -126,7 +126,7 @@ class History {
     return this.dense ? new Float32Array(this.grid.size) : new Int32Array(this.grid.size);
   }
 
-  /* Zeros for the groups of ants, in memory that frames share. */
+  /* Zeros for the groups or marks of ants, in memory that frames share. */
   none(length) {
     if (!(this.zeros?.length >= length)) this.zeros = new Uint8Array(2 * length);
     return this.zeros.subarray(0, length);
@@ -138,6 +138,7 @@ class History {
     if (!frame.numbers.length && frame.ants) frame.numbers = before.numbers;
     if (!frame.queens.length) frame.queens = before.queens;
     if (frame.groups.length < frame.cells.length) frame.groups = this.none(frame.cells.length);
+    if (frame.marks.length < frame.cells.length) frame.marks = this.none(frame.cells.length);
     frame.number = moment;
     frame.whole = whole;
     frame.passed = before && before.episode === frame.episode ? frame.tick - before.tick : 0;
@@ -176,7 +177,7 @@ class History {
     for (; this.first < first; this.first++) {
       const { number, size, ...rest } = this.frames[this.first];
       const clock = Object.fromEntries(CLOCK.map((name) => [name, rest[name]]));
-      const nothing = { numbers: [], cells: [], poses: [], groups: [], states: [], acts: [], choices: [], td_errors: [], passed: 0 };
+      const nothing = { numbers: [], cells: [], poses: [], groups: [], marks: [], states: [], acts: [], choices: [], td_errors: [], passed: 0 };
       this.frames[this.first] = { number, ...clock, ...nothing };
       this.bytes -= size;
     }
@@ -323,8 +324,8 @@ class History {
 
   /* An ant at a moment, with its next action; null if it does not live then.
 
-     {number, nest, caste, kind, idle, cell, heading, loaded, state, values, act}. kind is that of its
-     food. act is null if unknown or if the ant is idle, else
+     {number, nest, caste, kind, marks, rests, cell, heading, loaded, state, values, act}. kind is that of its
+     food. act is null if unknown or if the ant rests, else
      {action, executed, event, reward, why, ties, ahead, tdError, sharers, before, after, values}.
      action is the chosen one. why is "best", "tie" (of `ties` actions) or "explored", by the values
      at the time of the choice, one tick earlier if it was made `ahead`; "" if these are unknown; or
@@ -336,12 +337,13 @@ class History {
     const frame = this.frames[moment];
     const ant = {
       number, nest: frame.poses[i] >> 4, caste: frame.groups[i] & 15, kind: (frame.groups[i] >> 4) & 7,
-      idle: frame.groups[i] > 127, cell: frame.cells[i], heading: frame.poses[i] & 7,
+      marks: this.header.marks.map((_, k) => frame.marks[k * frame.cells.length + i]), cell: frame.cells[i], heading: frame.poses[i] & 7,
       loaded: (frame.poses[i] & 8) > 0, state: frame.states[i], act: null,
     };
     ant.values = this.row(moment, ant);
     const next = this.frames[moment + 1];
-    if (next && next.acts.length && (next.acts[i] & 15) !== IDLE) ant.act = this.act(moment, i, ant);
+    ant.rests = next?.acts.length > 0 && (next.acts[i] & 15) === RESTS;
+    if (next && next.acts.length && !ant.rests) ant.act = this.act(moment, i, ant);
     return ant;
   }
 
@@ -434,7 +436,7 @@ class History {
         if (frame.cells[i] !== cell + offset) continue;
         const ant = { nest: frame.poses[i] >> 4, cell: frame.cells[i], heading: frame.poses[i] & 7 };
         const action = next.acts[i] & 15, event = this.header.events[next.acts[i] >> 4];
-        const targets = action === IDLE ? [] : this.targets(ant, action);
+        const targets = action === RESTS ? [] : this.targets(ant, action);
         if (targets.includes(cell)) found.push({ number: frame.numbers[i], action, event, several: targets.length > 1 });
       }
     }

@@ -102,10 +102,12 @@ class Panel {
     return safe(this.history.header.foods[kind] ?? "food");
   }
 
-  /* The nest and the caste of an ant, and whether it is idle, where these differ between ants. */
-  groupsOf({ nest, caste, idle }) {
+  /* The nest and the caste of an ant where these differ between ants, and its marks. */
+  groupsOf({ nest, caste, marks }) {
     const { castes, nests } = this.history.header;
-    const words = [...(nests > 1 ? [`nest ${nest}`] : []), ...(castes.length ? [castes[caste]] : []), ...(idle ? ["idle"] : [])];
+    const shown = this.history.header.marks.map(({ words, most }, k) =>
+      most === null ? (marks[k] > 127 ? words : "") : `${words} ${plain(Math.round(most * (1 - marks[k] / 255)))}`);
+    const words = [...(nests > 1 ? [`nest ${nest}`] : []), ...(castes.length ? [castes[caste]] : []), ...shown.filter(Boolean)];
     return words.length ? `<span class="label groups">${safe(words.join(" · "))}</span>` : "";
   }
 
@@ -181,7 +183,7 @@ class Panel {
 
   storyOf(ant, before = "") {
     const { header, live } = this.history, act = ant.act;
-    if (ant.idle && !act) return '<div class="story"><span class="label">It is idle, so it does not act.</span></div>';
+    if (ant.rests) return '<div class="story"><span class="label">It rests, so it does not act.</span></div>';
     if (ant.past) return this.storyOf(ant.past, '<span class="label">In the last tick:</span>');
     if (!act) {
       const late = this.history.length === 1 ? "This page opened after the last tick. Actions appear from the next tick."
@@ -256,9 +258,10 @@ class Panel {
     const { foods } = this.history.header;
     const kinds = (foods.length ? foods : ["food"]).map((name, kind) =>
       `${cell("var(--food-floor)", drawing(this.stage.colours[ofKind(kind)], CRUMBS))}${safe(name)}`);
-    const idle = this.history.header.idles ? [`${bodies[0].replace("<svg", '<svg opacity=".4"')}idle ant`] : [];
+    const faded = this.history.header.marks.map(({ words, most }) =>
+      `${bodies[0].replace("<svg", '<svg opacity=".4"')}${safe(most === null ? `${words} ant` : `ant with little ${words}`)}`);
     byId("legend").innerHTML = [
-      `${bodies[0]}ant`, `${bodies[1]}ant with food`, ...idle, ...kinds,
+      `${bodies[0]}ant`, `${bodies[1]}ant with food`, ...faded, ...kinds,
       `${cell("var(--queen-floor)", drawing("var(--queen)", CROWN))}queen`, `${cell("var(--rock)")}rock`,
       `<span class="ramp"></span>${safe(this.history.header.pheromone)}`, ...nests,
     ].map((item) => `<li>${item}</li>`).join("");

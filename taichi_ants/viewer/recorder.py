@@ -15,7 +15,8 @@ from taichi_ants import learners
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.results import Trace
 from taichi_ants.errors import AntsError, check_one_of, count, expect
-from taichi_ants.features.labour import LABOUR
+from taichi_ants.features import used_by
+from taichi_ants.features.feature import Feature, Mark
 from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
@@ -25,7 +26,7 @@ from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.viewer.frames import Recording, pack, types_of
 
 _MOST_NAMES = 4096  # states up to which a header names all states, seen or not
-_IDLE = 15  # the action of an idle ant in frames
+_RESTS = 15  # the action of an ant that rests in frames
 _MOST = 2000  # points of curves
 
 Point = tuple[float, ...]  # see `frames.POINT`
@@ -109,6 +110,11 @@ class Recorder:
         """The rules of the pheromone that the page shows."""
         return self.colony.pheromones[self.colony.task.number_of(self.pheromone)]
 
+    @property
+    def _marks(self) -> list[tuple[Feature, Mark]]:
+        """The marks of the features of the task."""
+        return [(feature, mark) for feature in used_by(self.colony.task) for mark in feature.marks]
+
     def header(self) -> dict[str, Any]:
         """Return facts about all frames, JSON-compatible."""
         colony, task = self.colony, self.colony.task
@@ -118,7 +124,7 @@ class Recorder:
         by_letters = colony.has_training and not is_own and not task.noise.misread
         names = (TRAIL, *task.fields, COMPASS)  # the number of the compass is -1
         return {
-            "format": 4,
+            "format": 5,
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
             "ranges": list(self.grid.ranges),
             "types": self.types,
@@ -133,7 +139,10 @@ class Recorder:
             "events": [event.name for event in Event],
             "castes": list(task.castes),
             "foods": list(task.foods),
-            "idles": LABOUR.is_used(task),
+            "marks": [
+                {"words": mark.words, "most": getattr(feature.of(task), mark.most, None)}
+                for feature, mark in self._marks
+            ],
             "rule": task.choice.rule,
             "values": colony.has_training,  # whether ants choose by action values
             # The view of the pheromone, "" if an ant may know more or less than its letters say.
@@ -223,9 +232,9 @@ class Recorder:
         places = order[np.searchsorted(after, numbers, sorter=order)]
         actions = colony.actions[self.world, places]
         executed = colony.executed[self.world, places]
-        executed = np.where(executed < 0, _IDLE, executed)
+        executed = np.where(executed < 0, _RESTS, executed)
         acts = {"acts": executed + 16 * colony.events[self.world, places]}
-        acts["choices"] = np.where(actions < 0, _IDLE, actions + 8 * ahead)
+        acts["choices"] = np.where(actions < 0, _RESTS, actions + 8 * ahead)
         acts["rewards"] = colony.rewards[self.world, places]
         if td_errors is None and self._learns:
             td_errors = self._td_errors(before, slots, states, actions)
@@ -252,7 +261,7 @@ class Recorder:
         NaN for learners with more than one update per step, and if the learning rate is 0.
         """
         errors, learner = np.full(len(slots), np.nan), learners.get(self.colony.training.learner)
-        acted = actions >= 0  # idle ants have not
+        acted = actions >= 0  # ants that rest have not
         if learner.td_error is None or learner.plans or not acted.any():
             return errors
         slots, states = slots[acted], states[acted]
@@ -278,8 +287,12 @@ class Recorder:
         sections["poses"] = snapshot.ant_headings[order] + 8 * carrying + 16 * nests
         if colony.task.castes or colony.n_kinds > 1:
             foods = np.maximum(snapshot.ant_foods[order], 0)
-            idle = snapshot.ant_idle[order]
-            sections["groups"] = snapshot.ant_castes[order] + 16 * foods + 128 * idle
+            sections["groups"] = snapshot.ant_castes[order] + 16 * foods
+        if self._marks:
+            sections["marks"] = [
+                mark.fades(snapshot.of_ants[mark.view][order], feature.of(colony.task))
+                for feature, mark in self._marks
+            ]
         if not np.array_equal(snapshot.queens, self._queens):
             sections["queens"] = self._queens = snapshot.queens
         sections["states"] = colony.states[self.world, slots]

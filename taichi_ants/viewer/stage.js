@@ -310,7 +310,7 @@ class Stage {
       const x = (1.5 * r - camera.x) * camera.scale + this.width / 2;
       const y = (root * (0.5 * r - q) - camera.y) * camera.scale + this.height / 2;
       if (!this.sees([x, y])) continue;
-      const kind = kindOf(frame.poses[i], frame.groups[i]);
+      const kind = kindOf(frame.poses[i], frame.groups[i], this.fadeOf(frame, i));
       if (dots) {
         (squares[kind] ??= new Path2D()).rect(x - side / 2, y - side / 2, side, side);
         continue;
@@ -332,6 +332,14 @@ class Stage {
       above.fill(square);
     });
     above.globalAlpha = 1;
+  }
+
+  /* How faded an ant is by all of its marks. */
+  fadeOf(frame, i) {
+    const n = frame.cells.length;
+    let fade = frame.marks[i] ?? 0;
+    for (let k = n + i; k < frame.marks.length; k += n) fade = Math.max(fade, frame.marks[k]);
+    return fade;
   }
 
   /* The drawing of an ant of a kind, see `kindOf`. */
@@ -468,10 +476,10 @@ function ofKind(kind) {
   return kind > 0 ? `food ${kind}` : "food";
 }
 
-/* What determines the drawing of an ant besides its heading, from its pose and group: 1 with food, plus 2
-   times the nest, plus 16 times the kind of food, plus 128 if it is idle. */
-function kindOf(pose, group) {
-  return (pose >> 3) | (group & 0xf0);
+/* What determines the drawing of an ant besides its heading, from its pose, its group and how faded it is, 0
+   to 255: 1 with food, plus 2 times the nest, plus 16 times the kind of food, plus 128 for each 32 of its fading. */
+function kindOf(pose, group, fade) {
+  return (pose >> 3) | (group & 0x70) | ((fade >> 5) << 7);
 }
 function antColour(kind) {
   return ofNest("ant", (kind >> 1) & 7);
@@ -481,7 +489,7 @@ function dotColour(kind) {
   return !(kind & 1) ? antColour(kind) : food ? ofKind(food) : "loaded-dot";
 }
 function opacityOf(kind) {
-  return kind & 128 ? 0.4 : 1;
+  return 1 - (0.6 * (kind >> 7)) / 7;
 }
 
 function circle(x, y, radius) {

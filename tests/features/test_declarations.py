@@ -66,7 +66,7 @@ def identifiers(path: Path) -> set[str]:
 # of births and food, are algorithms with static tests.
 OWN = {
     "labour": {
-        *("Threshold", "thresholds", "stimulus", "stimuli", "ant_thresholds"),
+        *("Threshold", "idle", "thresholds", "stimulus", "stimuli", "ant_idle", "ant_thresholds"),
         *("stop_probability", "demand", "relief"),
     },
     "noise": {"slip", "slip_below", "misread_below"},

@@ -54,9 +54,9 @@ def test_frames_have_castes_kinds_of_food_and_rewards(sharing):
         assert np.array_equal(kinds, snapshot.food_kinds)
         groups = frame["groups"]
         assert (groups & 15 == colony.castes[0, order]).all()
-        assert (groups > 127).tolist() == colony.idle[0, order].tolist()
+        assert (frame["marks"] == 255 * colony.idle[0, order]).all()
         carried = snapshot.ant_foods[numbers]
-        assert ((groups >> 4) & 7 == np.maximum(carried, 0)).all()
+        assert (groups >> 4 == np.maximum(carried, 0)).all()
         seen |= {("carried", kind) for kind in carried.tolist()}
         frame = unpack(recorder.types, recorder.tick())
         idle = colony.actions[0, order] < 0
@@ -76,4 +76,4 @@ def test_frames_have_castes_kinds_of_food_and_rewards(sharing):
     assert np.array_equal(found, colony.snapshot().food_kinds)
     header = recorder.header()
     assert (header["castes"], header["foods"]) == ([*CASTES], [*FOODS])
-    assert header["idles"]
+    assert header["marks"] == [{"words": "idle", "most": None}]
