@@ -225,7 +225,7 @@ WRONG = [
     (lambda: At(3, remove_ants=1.5), "`remove_ants.share` is 1.5; it must be between 0 and 1"),
     (lambda: At(3, remove_ants={"shar": 1}), "`remove_ants.shar` is not a setting; choose share"),
     (lambda: At(3, remove_ants={"number": 1, "share": 0.5}), "has number and share; give one of"),
-    (lambda: At(3, clear=[[1, 2]]), "`clear.cells` has the cell [1, 2]; a cell is three"),
+    (lambda: At(3, clear=[[1, 2]]), "a cell of `clear.cells` is [1, 2]; it must be three whole"),
     (lambda: At(3, move=[[1, 2, 0]]), "`move.cells` is ((1, 2, 0),); give the cell to move from"),
     (lambda: At(3, task="following"), "`at.task` is 'following'; it must be a table of settings"),
     (lambda: Every(5, stop=2, trail=0), "`every.stop` is 2, before the first event"),
@@ -249,7 +249,7 @@ WRONG_IN_A_RUN = [
     (When("living", above=3, epsilon=0.3), "`when.epsilon` would change all 2 worlds"),
     (
         At(9, place={"what": "food", "cells": [[1, 0, 0]], "kind": "seed"}),
-        "`place.kind` is 'seed', but the task has no kinds of food; leave it out, or add",
+        "`place.kind` is 'seed'; it must be left out, because the task has no kinds of food",
     ),
     (At(9, place={"what": "queen", "cells": [[9, 0, 0]]}), "the queen cannot move to cell"),
 ]
