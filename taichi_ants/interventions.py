@@ -27,7 +27,6 @@ from taichi_ants.errors import (
     entries_of,
     is_flag,
     refuse,
-    shown,
     whole,
 )
 from taichi_ants.files.inputs import place_of
@@ -103,6 +102,7 @@ class ShorthandSettings(Settings):
         cells = value if isinstance(value, str) else entries_of(value)
         short = {"number": value, "level": value} if is_whole else {}
         short |= {"share": value} if isinstance(value, float) else {}
+        short |= {"source": value} if isinstance(value, str) else {}
         short |= {"value": value} | ({} if cells is None else {"cells": cells})
         name = next((name for name in cls.short_for if name in short), None)
         return None if name is None else {name: short[name]}
@@ -170,7 +170,7 @@ class Intervention(ShorthandSettings):
         """Raise AntsError unless there are n cells; `form` says which."""
         cells: Any = self.cells  # type: ignore[attr-defined]
         if isinstance(cells, str) or len(cells) != n:
-            raise AntsError(f"`{self.path}.cells` is {shown(cells)}; give {form}.")
+            refuse(f"`{self.path}.cells`", cells, form)
 
 
 @dataclass(frozen=True)
@@ -335,20 +335,17 @@ class SetTask(Intervention, path="task"):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         changed = self.changed(task)
-        castes = {name: caste.fixed for name, caste in task.castes.items()}
-        if castes != {name: caste.fixed for name, caste in changed.castes.items()}:
-            raise AntsError(
-                "the task cannot change the share, ants, nest or policy of a caste in an episode, "
-                "or whether it has thresholds; change its other numbers."
-            )
-        if Model(task, learns) != Model(changed, learns):
+        castes, new_castes = (
+            {name: caste.fixed for name, caste in one.castes.items()} for one in (task, changed)
+        )
+        if castes != new_castes or Model(task, learns) != Model(changed, learns):
             old, new = flat(task.as_dict()), flat(changed.as_dict())
             names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
             changes = (f"{name} from {old.get(name)!r} to {new.get(name)!r}" for name in names)
             raise AntsError(
                 f"the task cannot change {' and '.join(changes)} in an episode, because that "
-                "requires other kernels; change settings that kernels read as numbers, for "
-                "example pheromone.level."
+                "requires other kernels or castes; change settings that kernels read as numbers, "
+                "for example pheromone.level."
             )
 
 
@@ -396,12 +393,10 @@ class SetPolicy(Intervention, path="policy", short_for=("source",)):
 
     @classmethod
     def converted(cls, value: Any) -> Any:
-        if isinstance(value, (str, Path)):
-            return cls(str(value))
-        if isinstance(value, (Mapping, cls)):
-            return super().converted(value)
         table = getattr(value, "q_values", value)
-        return cls("a table", np.asarray(table)) if isinstance(table, np.ndarray) else value
+        if isinstance(table, np.ndarray):
+            return cls("a table", table)
+        return super().converted(str(value) if isinstance(value, Path) else value)
 
     def as_dict(self) -> dict[str, Any]:
         return {**super().as_dict(), **({"sha256": self.sha256} if self.sha256 else {})}

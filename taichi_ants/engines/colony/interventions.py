@@ -37,7 +37,6 @@ from taichi_ants.grid.constants import (
     N_HEADINGS,
     STREAM_BORN,
     STREAM_INTERVENTION,
-    STREAM_START_CELL,
 )
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
@@ -45,7 +44,7 @@ from taichi_ants.interventions import Intervention, flat_indices
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.task.field import TRAIL
-from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import World, free_cells
 
 Change = Iterator[None]  # yields once, between its checks and its effects
 REACH = 8  # cells; twice the radius of the largest brush on the live page
@@ -117,8 +116,8 @@ class _World:
         if change.cells is None:
             return self._add_some(self._amount(change), change.heading, change.nest)
         cells = self._index(change.cells)
-        distances = [self.colony.grid.distances(queen)[cells] for queen in self._queens()]
-        nests = np.argmin(distances, axis=0)
+        grid, queens = self.colony.grid, self.colony.grid.cells(self.queen_cells).tolist()
+        nests = np.argmin([grid.distances(tuple(queen))[cells] for queen in queens], axis=0)
         if change.nest is not None:
             nests = np.full(len(cells), change.nest)
         return self._add(cells, nests, change.heading)
@@ -193,19 +192,16 @@ class _World:
         AntsError if there is too little room.
         """
         colony, grid = self.colony, self.colony.grid
-        free = np.flatnonzero((self.view("ground") == EMPTY) & grid.exists)
-        if n > len(free):
+        free = (self.view("ground") == EMPTY) & grid.exists
+        if n > (room := int(np.count_nonzero(free))):
             raise AntsError(
-                f"{count(n, 'ant')} cannot join, because there are {count(len(free), 'free cell')};"
-                " add fewer ants."
+                f"{count(n, 'ant')} cannot join, because there are {count(room, 'free cell')}; add "
+                "fewer ants."
             )
-        words = stream_state(colony.seeds[self.w], STREAM_START_CELL, grid.number(grid.cells(free)))
-        queens, near = self._queens(), colony.start == "nest"
-        wanted = range(len(queens)) if nest is None else [nest]
-        orders = [
-            free[np.lexsort((words, grid.distances(queens[nest])[free] * near))] for nest in wanted
-        ]
-        return self._add(_in_turn(orders, n), np.resize(wanted, n), heading)
+        nests = np.resize(range(colony.n_nests) if nest is None else [nest], n)
+        queens = grid.cells(self.queen_cells)
+        cells = free_cells(grid, free, queens, nests, colony.seeds[self.w], colony.start)
+        return self._add(cells, nests, heading)
 
     def _index(self, cells: Sequence[Any] | str) -> np.ndarray:
         """Return the flat indices of cells, or of those of a region, without duplicates."""
@@ -241,10 +237,6 @@ class _World:
         if change.share is None:
             return change.number or 0
         return int(change.share * len(self._living_slots(change.nest)) + 0.5)
-
-    def _queens(self) -> list[Any]:
-        """Return the cell of each nest's queen."""
-        return [tuple(cell) for cell in self.colony.grid.cells(self.queen_cells).tolist()]
 
     def _start_with(self, cells: Any, contents: Any) -> Change:
         """Let later episodes begin with these contents of cells, see `_start_of`.
@@ -562,14 +554,3 @@ def _start_of(world: World) -> np.ndarray:
     start = world.ground()
     start[world.grid.index(world.queens)] |= (np.arange(world.n_nests) << _NUMBER).astype(np.uint8)
     return start | world.kinds_by_cell() << _NUMBER
-
-
-def _in_turn(orders: Sequence[np.ndarray], n: int) -> np.ndarray:
-    """Return the first n cells, of which each order in turn takes its first that is not taken."""
-    if len(orders) == 1:
-        return orders[0][:n]
-    taken: dict[int, None] = {}
-    turns = [(cell for cell in order.tolist() if cell not in taken) for order in orders]
-    for k in range(n):
-        taken[next(turns[k % len(turns)])] = None
-    return np.fromiter(taken, np.int64, n)

@@ -226,7 +226,7 @@ WRONG = [
     (lambda: At(3, remove_ants={"shar": 1}), "`remove_ants.shar` is not a setting; choose share"),
     (lambda: At(3, remove_ants={"number": 1, "share": 0.5}), "has number and share; give one of"),
     (lambda: At(3, clear=[[1, 2]]), "a cell of `clear.cells` is [1, 2]; it must be three whole"),
-    (lambda: At(3, move=[[1, 2, 0]]), "`move.cells` is ((1, 2, 0),); give the cell to move from"),
+    (lambda: At(3, move=[[1, 2, 0]]), "`move.cells` is ((1, 2, 0),); it must be the cell to move from"),
     (lambda: At(3, task="following"), "`at.task` is 'following'; it must be a table of settings"),
     (lambda: Every(5, stop=2, trail=0), "`every.stop` is 2, before the first event"),
     (lambda: When("living", trail=0), "`when` needs a bound"),
