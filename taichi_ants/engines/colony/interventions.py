@@ -308,8 +308,7 @@ class _World:
 
     def _can_be_free(self, cell: int) -> bool:
         """Return whether a cell is empty, except for an ant that can move aside."""
-        slots, _ = self._aside(np.array([cell]))
-        return bool(self.view("ground")[cell] == EMPTY) or len(slots) > 0
+        return self.view("ground")[cell] == EMPTY or len(self._aside(np.array([cell]))[0]) > 0
 
     def _lay(self, cells: np.ndarray, level: int, number: int) -> None:
         """Set the levels of a pheromone in cells; 0 is the trail."""
@@ -437,8 +436,13 @@ class Interventions:
         if isinstance(change, language.SetPolicy):  # ants that are given actions follow none either
             learns |= colony.is_given_actions
         change.check_in(colony.worlds[self.worlds[0]], colony.task, learns)
-        if change.in_all_worlds or (self.lasting and isinstance(change, language.SetAnts)):
-            self._check_all(change)
+        sets_start = self.lasting and isinstance(change, language.SetAnts)
+        running = np.flatnonzero(colony.running).tolist() if colony.episode >= 0 else []
+        if (change.in_all_worlds or sets_start) and not set(running) <= set(self.worlds):
+            raise AntsError(
+                f"the worlds of a colony share what `{change.path}` changes, so it cannot change "
+                "in some of them; change all worlds, or make a colony with a single seed."
+            )
         match change:
             case language.Episode():
                 self.begin_episode()
@@ -461,14 +465,6 @@ class Interventions:
             case _:
                 self._change(change)
 
-    def _check_all(self, change: Intervention) -> None:
-        running = np.flatnonzero(self.colony.running).tolist()
-        if self.colony.episode >= 0 and not set(running) <= set(self.worlds):
-            raise AntsError(
-                f"the worlds of a colony share what `{change.path}` changes, so it cannot change "
-                "in some of them; change all worlds, or make a colony with a single seed."
-            )
-
     def _change(self, change: Intervention) -> None:
         """Make a change in all worlds, after its checks in all; then their ants observe again."""
         colony, worlds = self.colony, list(self.worlds)
@@ -488,17 +484,16 @@ class Interventions:
     def set_task(self, task: Task) -> None:
         """Set a task that differs only in settings that kernels read as numbers."""
         colony = self.colony
-        levels = [
-            (world, number, np.maximum(colony.stored_pheromone(world, number) - clock, 0))
+        clocks = {
+            (world, number): colony.trail_clock(world, number)
             for world in range(len(colony.worlds))
             for number, pheromone in enumerate(colony.pheromones)
             if not pheromone.dense
-            for clock in [colony.trail_clock(world, number)]
-        ]
+        }
         colony.set_task(task)
-        for world, number, level in levels:
-            clock = colony.trail_clock(world, number)
-            colony.stored_pheromone(world, number)[:] = np.where(level > 0, level + clock, 0)
+        for which, clock in clocks.items():
+            stored = colony.stored_pheromone(*which)
+            stored[:] = np.where(stored > clock, stored - clock + colony.trail_clock(*which), 0)
 
     def state(self) -> str:
         """Return a hash of the whole state; colonies with equal hashes behave identically."""
