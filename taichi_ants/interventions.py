@@ -12,10 +12,8 @@ cells, which can differ between the worlds of a colony.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, field
-from pathlib import Path
+from dataclasses import MISSING, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
@@ -29,9 +27,7 @@ from taichi_ants.errors import (
     refuse,
     whole,
 )
-from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.learners.policies import NAMED, checked_values, load_policy
 from taichi_ants.settings import (
     Setting,
     Settings,
@@ -63,7 +59,6 @@ _SHORT = {  # the short forms of interventions, by the setting that such a value
     "cells": "a list of cells, the name of a region",
     "level": "a level, which is a whole number",
     "value": "a number",
-    "source": "a policy file, the name of a hand-written policy",
 }
 INTERVENTIONS: dict[str, type[Intervention]] = {}
 
@@ -102,7 +97,6 @@ class ShorthandSettings(Settings):
         cells = value if isinstance(value, str) else entries_of(value)
         short = {"number": value, "level": value} if is_whole else {}
         short |= {"share": value} if isinstance(value, float) else {}
-        short |= {"source": value} if isinstance(value, str) else {}
         short |= {"value": value} | ({} if cells is None else {"cells": cells})
         name = next((name for name in cls.short_for if name in short), None)
         return None if name is None else {name: short[name]}
@@ -367,53 +361,6 @@ class SetLearningRate(Intervention, path="learning_rate", short_for=("value",)):
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         if not learns:
             raise AntsError("the ants do not learn, so they have no learning rate; leave it out.")
-
-
-@dataclass(frozen=True)
-class SetPolicy(Intervention, path="policy", short_for=("source",)):
-    """Replace the policy that the ants follow; for colonies that do not learn.
-
-    In Python, a table of action values or anything with `q_values` is a short form.
-    """
-
-    source: Annotated[str, Setting("policy file, or the name of a hand-written policy")]
-    table: np.ndarray | None = field(default=None, compare=False, repr=False)
-    sha256: str = ""  # of the table; "" for hand-written policies
-
-    def check(self) -> None:
-        super().check()
-        if self.source in NAMED:
-            return
-        if self.table is None:
-            if not self.source.endswith(".npz") and not Path(place_of(self.source)).exists():
-                refuse("`policy`", self.source, f"one of {', '.join(NAMED)}, or a policy file")
-            object.__setattr__(self, "table", load_policy(self.source).q_values)
-        content = hashlib.sha256(np.ascontiguousarray(self.table, np.float32).tobytes())
-        object.__setattr__(self, "sha256", content.hexdigest())
-
-    @classmethod
-    def converted(cls, value: Any) -> Any:
-        table = getattr(value, "q_values", value)
-        if isinstance(table, np.ndarray):
-            return cls("a table", table)
-        return super().converted(str(value) if isinstance(value, Path) else value)
-
-    def as_dict(self) -> dict[str, Any]:
-        return {**super().as_dict(), **({"sha256": self.sha256} if self.sha256 else {})}
-
-    def table_for(self, task: Task) -> np.ndarray:
-        """Return the table; AntsError if it is not for the observation of the task."""
-        table = NAMED[self.source](task.observation) if self.table is None else self.table
-        return checked_values(table, task)
-
-    def check_in(self, world: World, task: Task, learns: bool) -> None:
-        if learns or not task.choice.needs_table:
-            raise AntsError(
-                f"the ants of this colony learn, are given actions, or choose without action "
-                f"values (`task.choice.rule` is {task.choice.rule!r}), so they follow no policy; "
-                'make a colony with sharing="frozen" and q_values.'
-            )
-        self.table_for(task)
 
 
 @dataclass(frozen=True)

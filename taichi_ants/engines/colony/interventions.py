@@ -31,7 +31,6 @@ from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, NestRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
-from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.errors import AntsError, count, entries_of, shown
 from taichi_ants.grid.constants import (
     N_HEADINGS,
@@ -42,7 +41,7 @@ from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.interventions import Intervention, flat_indices
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import World, free_cells
 
@@ -432,10 +431,7 @@ class Interventions:
             AntsError: A world does not allow the change; nothing has changed in any world.
         """
         colony = self.colony
-        learns = colony.learns
-        if isinstance(change, language.SetPolicy):  # ants that are given actions follow none either
-            learns |= colony.is_given_actions
-        change.check_in(colony.worlds[self.worlds[0]], colony.task, learns)
+        change.check_in(colony.worlds[self.worlds[0]], colony.task, colony.learns)
         sets_start = self.lasting and isinstance(change, language.SetAnts)
         running = np.flatnonzero(colony.running).tolist() if colony.episode >= 0 else []
         if (change.in_all_worlds or sets_start) and not set(running) <= set(self.worlds):
@@ -456,12 +452,6 @@ class Interventions:
                     colony.training, learning_rate_decay=1.0, min_learning_rate=0.0
                 )
                 colony.set_learning_rate(change.value)
-            case language.SetPolicy():
-                table = change.table_for(colony.task)
-                for w in self.worlds:
-                    q = colony.part("q", w)
-                    q.reshape(-1, len(table), ROW)[..., :N_ACTIONS] = table
-                    note_best_actions(q)
             case _:
                 self._change(change)
 
