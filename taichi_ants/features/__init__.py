@@ -49,9 +49,9 @@ def arrays(per: str) -> Iterator[tuple[Feature, Array]]:
                 yield feature, array
 
 
-def fixed_in(caste: Any) -> dict[str, Any]:
-    """Return what of a caste cannot change in an episode, by words for it."""
-    return {words: of(caste) for feature in FEATURES for words, of in feature.fixed.items()}
+def fixed_in(caste: Any) -> list[Any]:
+    """Return what of a caste cannot change in an episode."""
+    return [feature.fixed(caste) for feature in FEATURES]
 
 
 def feature_of_input(name: str) -> Feature | None:

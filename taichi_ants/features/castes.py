@@ -232,12 +232,10 @@ CASTES = Feature(
         "lays": _lays,
         "cues": lambda task, caste: task.all_cues.index(task.cues_of(caste)),
     },
-    fixed={
-        "its share, ants, nest or policy": lambda caste: (
-            *(caste.share, caste.ants, caste.nest, caste.policy),
-            bool(caste.epsilon_spread),
-        )
-    },
+    fixed=lambda caste: (
+        *(caste.share, caste.ants, caste.nest, caste.policy),
+        bool(caste.epsilon_spread),
+    ),
     columns=_columns,
     constants=_constants,
 )

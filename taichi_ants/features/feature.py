@@ -142,7 +142,7 @@ class Feature:
         probabilities: Settings that hooks read as `a.SETTING_below`: a bound of random words, u64.
         of_castes: Numbers of each caste, f64, which hooks read as `a.NAME`: functions of a task and
             a caste.
-        fixed: Functions of a caste whose results cannot change in an episode, by words for them.
+        fixed: A function of a caste whose result cannot change in an episode.
         columns: A function of a colony that returns the arrays (W, ants) of ants that start, where
             these are not 0.
         constants: A function of a colony that returns further arrays of its kernels.
@@ -164,7 +164,7 @@ class Feature:
     numbers: tuple[str, ...] = ()
     probabilities: tuple[str, ...] = ()
     of_castes: Mapping[str, Callable[[Task, Caste], float]] = field(default_factory=dict)
-    fixed: Mapping[str, Callable[[Caste], Any]] = field(default_factory=dict)
+    fixed: Callable[[Caste], Any] = lambda caste: None
     columns: Callable[[State], Mapping[str, Any]] = lambda state: {}
     constants: Callable[[State], Mapping[str, Any]] = lambda state: {}
     faults: Callable[[Task], Iterator[str]] = lambda task: iter(())

@@ -189,7 +189,7 @@ LABOUR = Feature(
         "value": lambda task, caste: caste.threshold.value or 0.0,
         "spread": lambda task, caste: caste.threshold.spread or 0.0,
     },
-    fixed={"whether it has thresholds": lambda caste: caste.threshold.exists},
+    fixed=lambda caste: caste.threshold.exists,
     faults=_faults,
     example={
         "labour": "thresholds",
