@@ -250,6 +250,9 @@ class Settings:
 
     path: ClassVar[str] = ""
     most_entries: ClassVar[float] = math.inf  # of this class in a `Named`
+    # What the description of a model says of these settings: a sentence for "NAME=VALUE", for a
+    # setting "NAME" that differs from its default, and for "" always. `{NAME}` is a value.
+    sentences: ClassVar[Mapping[str, str]] = {}
     form: ClassVar[str] = ""  # the values that stand for these settings, in the words of messages
 
     def __init_subclass__(cls, path: str = "", **more: Any) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -34,6 +34,29 @@ class Caste(Settings, path="task.castes.NAME"):
     the ants of the caste follow it and do not learn. `threshold` can also be a number, which is a
     fixed threshold.
     """
+
+    sentences: ClassVar = {
+        "share": "It has the share {share} of the ants of a nest.",
+        "ants": "It has {ants} ants in each nest at the start.",
+        "nest": "Only nest {nest} has it.",
+        "policy": "Its ants follow the policy `{policy}` and do not learn.",
+        "epsilon": "Its exploration rate is {epsilon}.",
+        "epsilon_spread": "The rates of its ants differ from that by up to {epsilon_spread}.",
+        "learning_rate": "Its learning rate is {learning_rate}.",
+        "discount": "Its discount is {discount}.",
+        "temperature": "Its temperature is {temperature}.",
+        "lays": "Its ants lay these pheromones: {lays}.",
+        "outbound_cue": "Without food, its ants see cells as T by `{outbound_cue}`.",
+        "homing_cue": "With food, its ants see cells as S by `{homing_cue}`.",
+        "lifespan": "Its ants die at the age of {lifespan} ticks.",
+        "threshold.distribution=fixed": "The threshold of its ants is {threshold.value}.",
+        "threshold.distribution=uniform": "The thresholds of its ants are uniform, "
+        "{threshold.value} ± {threshold.spread}.",
+        "threshold.distribution=normal": "The thresholds of its ants are normal, with the mean "
+        "{threshold.value} and the standard deviation {threshold.spread}, without negative ones.",
+        "threshold.distribution=lognormal": "The thresholds of its ants are lognormal, with the "
+        "median {threshold.value} and the standard deviation {threshold.spread} of the logarithm.",
+    }
 
     most_entries = MAX_CASTES
 

@@ -149,7 +149,7 @@ class Feature:
         faults: A function of a task that yields what is wrong with it, as sentences.
         example: Settings of a task that uses the feature.
         measures: Its measures by name.
-        marks: What pages show of its arrays of ants.
+        marks: The marks by which pages show its arrays of ants.
         hooks: Its hooks by the names of points.
         inputs: Inputs of your rules by name, with the functions of an ant that return them.
         by_deliveries: The inputs that change with the deliveries of a tick before ants observe.

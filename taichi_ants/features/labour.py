@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from numbers import Real
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -61,6 +61,15 @@ class Labour(Settings, path="task.labour"):
     for a stimulus s and n = `exponent`. A forager without food next to its queen becomes idle with
     the probability `stop_probability` per tick. See `docs/colony.md`.
     """
+
+    sentences: ClassVar = {
+        "rule=thresholds": "Each nest has a stimulus s, which is 0 at the start of an episode, "
+        "rises by {demand} per tick, and falls by {relief} with each delivery, but not below 0. "
+        "An idle ant with the threshold t starts to forage with the probability `s^{exponent} / "
+        "(s^{exponent} + t^{exponent})` per tick. A forager without food next to its queen "
+        "becomes idle with the probability {stop_probability} per tick (Bonabeau, Theraulaz and "
+        "Deneubourg 1996).",
+    }
 
     rule: Annotated[LabourRule, Setting("rule by which ants start and stop foraging")] = "none"
     demand: Annotated[

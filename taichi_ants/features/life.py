@@ -6,7 +6,7 @@ The queen and the food of a world change in the phases of the engine, `engines/c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from taichi_ants.features.feature import ANT, Array, Feature, Task, ti
 from taichi_ants.grid.constants import MAX_STEPS
@@ -22,6 +22,16 @@ class Life(Settings, path="task.life"):
     None means that ants do not die, food does not grow back, or food does not move. With `regrowth`
     0, food grows back in the same tick.
     """
+
+    sentences: ClassVar = {
+        "births": "The queen turns each food item that she receives into an ant on a free cell "
+        "next to her.",
+        "lifespan": "An ant dies at the age of {lifespan} ticks and leaves its food on its cell.",
+        "regrowth": "Food grows back in its cell {regrowth} ticks after it was taken, once the "
+        "cell is empty.",
+        "pile_move_interval": "Each pile of food moves by one cell every {pile_move_interval} "
+        "ticks.",
+    }
 
     births: Annotated[bool, Setting("turn each food item that the queen receives into an ant")] = (
         False

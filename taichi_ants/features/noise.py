@@ -8,7 +8,7 @@ seen among the other three, in ascending order.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from taichi_ants.features.feature import Feature, bits, ti
 from taichi_ants.settings import Setting, Settings, Share
@@ -25,6 +25,13 @@ class Noise(Settings, path="task.noise"):
     ant sees a cell in view as another of the four codes, drawn uniformly. This changes the state
     index by which ants choose and learn, but not the results and rewards of actions.
     """
+
+    sentences: ClassVar = {
+        "slip": "With probability {slip}, an ant executes any of the five actions instead of the "
+        "chosen one.",
+        "misread": "With probability {misread}, an ant sees a cell as one of the three other "
+        "codes.",
+    }
 
     slip: Annotated[
         Share, Setting("probability that an ant executes a random action instead of the chosen one")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.settings import Setting, Settings, Share, declared
@@ -28,6 +28,16 @@ class TrainingConfig(Settings, path="training"):
     defaults of `taichi_ants.learners.get(name).hyperparameters()`. Training, not this class, checks
     that the learner exists and has these hyperparameters.
     """
+
+    sentences: ClassVar = {
+        "": "Ants learn action values, which start at {initial_q}. After a step from state s by "
+        "action a, `Q(s, a)` changes by the learning rate times `target - Q(s, a)`. The discount "
+        "is {discount}, and ε {epsilon} in the first episode.",
+        "learning_rate_decay=1": "The learning rate is {learning_rate}.",
+        "learning_rate_decay": "The learning rate is {learning_rate} in the first episode; each "
+        "episode multiplies it by {learning_rate_decay}, down to {min_learning_rate}.",
+        "epsilon_decay": "Each episode multiplies ε by {epsilon_decay}, down to {min_epsilon}.",
+    }
 
     learner: Annotated[
         str,

@@ -6,6 +6,7 @@ results and the declarations of settings say. The author writes the text. No cod
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
@@ -17,11 +18,13 @@ from taichi_ants.analysis.tables import Table
 from taichi_ants.errors import AntsError
 from taichi_ants.features import FEATURES
 from taichi_ants.features.feature import Feature
+from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
-from taichi_ants.settings import DeclaredSetting, declared, flat
+from taichi_ants.rules.rule import RULES
+from taichi_ants.settings import DeclaredSetting, Named, Settings, all_of, declared, flat
 from taichi_ants.studies.folder import INPUTS, asked_in, checksum_of
 from taichi_ants.studies.sweep_file import declaration_of
-from taichi_ants.task import observations
+from taichi_ants.task import Task, observations
 
 Row = tuple[str, ...]
 
@@ -46,7 +49,7 @@ _OF_POINTS = {  # settings of points: unit and meaning
     "during": ("", "episodes in which the events happen"),
 }
 # Groups of settings that have no effect on a lone ant, whose episode ends at its delivery.
-_OF_COLONIES = ("task.traffic.", "task.life.", "task.labour.", "task.reward", "task.turns_at_queen")
+_OF_COLONIES = ("task.traffic", "task.life", "task.labour", "task.reward", "task.turns_at_queen")
 _OF_LEARNING = re.compile(
     r"training\..*|sharing|task\.(delivery|evaporation_in_training)"
     r"|task\.castes\.\w+\.(learning_rate|discount)"
@@ -161,6 +164,97 @@ class Model:
                 table.append((f"`{name}`", _several(values), unit, words))
         return table
 
+    def groups(self) -> Iterator[tuple[str, type[Settings], str]]:
+        """Yield the groups of settings of the task: path, class, and title."""
+        yield "task", Task, "Task"
+        for group in all_of(Task):
+            if group.is_group:
+                yield group.path, group.kind, group.name.replace("_", " ").capitalize()
+            elif group.kind is Named:
+                for entry in self.entries(group.name):
+                    title = f"{group.entry.__name__} `{entry}`"
+                    yield f"{group.path}.{entry}", group.entry, title
+
+    def sentences(self, path: str, cls: type[Settings]) -> Iterator[str]:
+        """Yield the sentences that hold for the settings of a group, at some of the points."""
+        defaults = {setting.path: setting.default for setting in all_of(cls)}
+        for key, text in cls.sentences.items():
+            name, _, value = key.partition("=")
+            values = self.values(f"{path}.{name}") if name else [True]
+            default = defaults.get(f"{cls.path}.{name}")
+            holds = [_value(v) == value if value else v != default for v in values]
+            own = {name: _several(v for v, is_true in zip(values, holds, strict=True) if is_true)}
+
+            def words(match: re.Match[str], path: str = path, own: dict[str, str] = own) -> str:
+                return own.get(match[1]) or self.words_of(f"{path}.{match[1]}")
+
+            if any(holds):
+                said = re.sub(r"\{([\w.]+)\}", words, text)
+                yield said if all(holds) else f"In some of the points: {said}"
+
+    def values(self, name: str) -> list[Any]:
+        """Return the values of a setting at the points in which it has an effect."""
+        rows = [row for row in self.rows if name in row]
+        return [row[name] for row in rows if self.uses(row, name, self.declaration(name, row))]
+
+    def words_of(self, name: str) -> str:
+        """Return the values of a setting in words."""
+        return _several([value for value in self.values(name) if value is not None] or [None])
+
+    def submodels(self) -> Iterator[str]:
+        """Yield a paragraph on each group of settings, and on each rule that the author wrote."""
+        for path, cls, title in self.groups():
+            is_used = self.of_colony or not path.startswith(_OF_COLONIES)
+            if path == "task.rewards":
+                is_used = any(row["episodes"] for row in self.rows)
+            if said := list(self.sentences(path, cls)) if is_used else []:
+                yield f"*{title}.* {' '.join(said)}"
+        for name in self.entries("rules"):
+            rule = RULES.yours.get(name)
+            words = inspect.getdoc(rule.function) if rule else None
+            yield f"*Rule `{name}`.* {words or 'See the plugin.'}"
+
+    def learning(self) -> str:
+        """Return what is said about learning."""
+        rows = [row for row in self.rows if row["episodes"] and "training.learner" in row]
+        if not rows:
+            policies = dict.fromkeys(filter(None, (row.get("policy.name") for row in self.rows)))
+            follows = f" They follow the policy {_several(policies)}." if policies else ""
+            return f"Ants do not learn.{follows}"
+        known = {row["training.learner"]: None for row in rows}
+        by = [f"`{n}` ({learners.get(n).summary})" for n in known if n in learners.names()]
+        learner = f"The learner is {' or '.join(by or map('`{}`'.format, known))}."
+        return " ".join([*self.sentences("training", TrainingConfig), learner])
+
+    def sensing(self) -> str:
+        """Return what is said about observations."""
+        known = dict.fromkeys(row["task.observation"] for row in self.rows)
+        summaries = [(n, observations.get(n).summary) for n in known if n in observations.names()]
+        return " ".join(f"Observation `{name}`: {summary}." for name, summary in summaries)
+
+    def schedule(self) -> str:
+        """Return the steps of a tick, in order."""
+        rules, ants, food = (
+            {value for row in self.rows for name, value in row.items() if re.search(end, name)}
+            for end in (
+                r"\.evaporation$",
+                r"\.(births|lifespan)$",
+                r"\.(regrowth|pile_move_interval)$",
+            )
+        )
+        steps = {
+            "Ants choose actions": True,
+            "of the ants that want one cell or food item, one wins": self.of_colony,
+            "ants act, get their rewards, and deposit": True,
+            "pheromones evaporate and spread": rules - {"none"},
+            "ants are born and die": ants - {None, False},
+            "food grows back, and piles move": food - {None},
+            "ants observe": True,
+            "ants learn": any(row["episodes"] for row in self.rows),
+        }
+        listed = "; ".join(step for step, is_there in steps.items() if is_there)
+        return f"{listed}. All ants finish a step before the next one begins."
+
     def entries(self, group: str) -> list[str]:
         """Return the names of the entries of a named group of the task, such as its fields."""
         parts = [name.split(".") for name in self.rows[0]]
@@ -253,13 +347,18 @@ def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
         "state_variables": _table(
             ("Entity", "State variable", "Values", "Unit"), model.state_variables()
         ),
+        "schedule": model.schedule(),
+        "learning": model.learning(),
+        "sensing": model.sensing(),
+        "submodels": "\n\n".join(model.submodels()),
         "seeds": ", ".join(map(str, model.settings["seeds"])),
         "measures": _table(("Measure", "Meaning"), model.measures()),
         "worlds": _table(of_worlds, worlds),
         "more_worlds": f"{len(model.places)} worlds; the manifest has all."
         if model.places[_MOST:]
         else "",
-        "events": _table(("Event", *heads[1:]), [row for row in rows if _EVENT.match(row[0])]),
+        "events": _table(("Event", *heads[1:]), [row for row in rows if _EVENT.match(row[0])])
+        or "Nothing from outside changes the model while it runs.",
         "parameters": _table(heads, [row for row in rows if not _EVENT.match(row[0])]),
         "sources": _table(("File", "SHA-256 begins"), sources),
     }

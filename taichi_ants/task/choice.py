@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from taichi_ants.features.castes import Attraction, Exponent, Temperature
 from taichi_ants.rules.registry import registered, words
@@ -30,6 +30,20 @@ class Choice(Settings, path="task.choice"):
 
     With "greedy" and "softmax", ants also explore: with probability epsilon, any action is taken.
     """
+
+    sentences: ClassVar = {
+        "rule=greedy": "With probability ε, the exploration rate, an ant takes any of the five "
+        "actions. Otherwise it takes one with the largest value `Q(s, a)`; ties are broken at "
+        "random.",
+        "rule=softmax": "With probability ε, the exploration rate, an ant takes any of the five "
+        "actions. Otherwise it takes action a with a probability proportional to `exp(Q(s, a) / "
+        "{temperature})`.",
+        "rule=deneubourg": "An ant gives if it sees its queen, and picks up if it sees food. "
+        "Otherwise it enters an open cell ahead with a probability proportional to `({k} + "
+        "c)^{exponent}`, where c is the level of the cell; with food, only cells nearer to the "
+        "queen if there are any (Deneubourg et al. 1990).",
+        "carriers_follow": "Ants with food compare the levels of `{carriers_follow}`.",
+    }
 
     rule: Annotated[
         str, Setting("rule by which ants choose actions", choices=partial(words, "choice"))

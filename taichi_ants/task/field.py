@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntFlag
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from taichi_ants.settings import Setting
 from taichi_ants.task.pheromone import Pheromone
@@ -54,6 +54,20 @@ class Field(Pheromone, path="task.fields.NAME"):
     Deposits that fade count ticks since the ant's last pick-up, delivery or birth, or since the
     start of the episode.
     """
+
+    sentences: ClassVar = {
+        "deposited_when=with_food": "Ants deposit on each cell that they enter with food and, when "
+        "they pick up food, on its cell and on their own.",
+        "deposited_when=without_food": "Ants deposit on each cell that they enter without food "
+        "and, when they deliver, on their own cell.",
+        "deposited_when=always": "Ants deposit on each cell that they enter, and when they pick up "
+        "or deliver.",
+        "deposited_when=dead_end": "An ant without food that sees three obstacles deposits on its "
+        "cell.",
+        "deposited_when=failed_pick_up": "An ant that fails to pick up food deposits on its cell.",
+        "deposited_when=never": "Ants never deposit.",
+        **Pheromone.sentences,
+    }
 
     deposited_when: Annotated[
         Laid,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from taichi_ants.features.life import Ticks
 from taichi_ants.settings import Setting, Settings
@@ -20,6 +20,12 @@ class Food(Settings, path="task.foods.NAME"):
     A cell with food has a number of loads, of which an ant takes one. The cell is food until its
     last load is taken; `regrowth` ticks later, it has all its loads again.
     """
+
+    sentences: ClassVar = {
+        "": "A cell has {loads} loads; the rewards are {pick_up} for picking up and {deliver} for "
+        "giving.",
+        "regrowth": "An empty cell has all its loads again after {regrowth} ticks.",
+    }
 
     most_entries = MAX_FOOD_KINDS
 

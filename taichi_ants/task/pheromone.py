@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeVar
 
 from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import BUILT_IN, Rule
@@ -41,6 +41,26 @@ class Pheromone(Settings, path="task.pheromone"):
       at least half the level of the strongest in view, "strongest" the same level.
       "strongest_under_carriers" also compares with trails under ants with food.
     """
+
+    sentences: ClassVar = {
+        "evaporation=linear": "In each tick, the level c of each cell becomes `max(c - 1, 0)`.",
+        "evaporation=exponential": "In each tick, the level of each cell is multiplied by `2^(-1 / "
+        "{half_life})`; a level below 1 becomes 0.",
+        "evaporation=none": "Levels do not evaporate.",
+        "diffusion": "Then a cell gives the share {diffusion} / 6 of its level to each neighbour; "
+        "the parts for rock and for the outside stay.",
+        "deposit=set": "A deposit sets the level of a cell: `c = {level}`.",
+        "deposit=add": "A deposit adds to the level of a cell: `c = min(c + {level}, {cap})`.",
+        "deposit=fading": "A deposit raises the level of a cell: `c = max(c, {level} - {slope} "
+        "t)`, t ticks after the load of the ant changed.",
+        "deposit=none": "Ants make no deposits.",
+        "view=half": "As a cue, an empty cell shows if its level is at least 1 and half of the "
+        "highest level among the empty cells in view.",
+        "view=strongest": "As a cue, an empty cell shows if its level is at least 1 and the "
+        "highest among the empty cells in view.",
+        "view=strongest_under_carriers": "As a cue, an empty cell shows if its level is at least 1 "
+        "and the highest in view, where cells under ants with food count too.",
+    }
 
     evaporation: Annotated[
         str,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from taichi_ants.settings import Setting, Settings
 from taichi_ants.task.constants import MOST_REWARD
@@ -18,6 +18,11 @@ Reward = Annotated[int, Setting(least=-MOST_REWARD, most=MOST_REWARD)]
 @dataclass(frozen=True)
 class Rewards(Settings, path="task.rewards"):
     """The reward of each event, a whole number; by default, those of table 1 of the paper."""
+
+    sentences: ClassVar = {
+        "": "The rewards are {empty} for a move onto E, {shaping} onto T or S, {pick_up} for "
+        "picking up, {deliver} for giving, and {failed} for an action that fails.",
+    }
 
     empty: Annotated[Reward, Setting("reward for a move onto a cell seen as empty (E)")] = 0
     failed: Annotated[

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache, partial
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from taichi_ants.errors import shown
 from taichi_ants.features import FEATURES, feature_of_input, probabilities, used_by
@@ -48,6 +48,17 @@ class Traffic(Settings, path="task.traffic"):
     food. The pushed ant gets the reward of a move onto an empty cell. With `follow`, all ants of a
     queue move at once; a ring of ants that claim each other's cells does not move.
     """
+
+    sentences: ClassVar = {
+        "": "If several ants want a cell or a food item, one of them wins, by a hash of its cell "
+        "and the tick. A move that fails turns the ant nevertheless.",
+        "swap": "An ant with food that wins a cell changes places with an ant without food on it, "
+        "unless that ant enters a cell itself or tries to pick up food.",
+        "follow": "An ant can enter a cell whose ant leaves it in the same tick.",
+        "carriers_first": "For a cell, ants with food win against ants without food.",
+        "reward_pushed": "An ant that is pushed onto the cell that it wanted gets the reward of "
+        "that move.",
+    }
 
     swap: Annotated[
         bool,
@@ -99,6 +110,22 @@ class Task(Settings, path="task"):
     an observation, a kind of pheromone, and rules of choice and noise; they read all other settings
     as numbers.
     """
+
+    sentences: ClassVar = {
+        "": "An ant sees a cell in view as O if it cannot be entered, as F (food) if the ant has "
+        "no food, as Q (its queen) if it has, and else as E or as its cue: T without food, S with "
+        "food. A move (left, forward, right) turns the ant and enters the cell there if that is "
+        "possible. Picking up takes food in view, and the ant turns around. Giving needs the queen "
+        "in view.",
+        "outbound_cue": "Ants without food see cells as T by the levels of `{outbound_cue}`.",
+        "homing_cue=compass": "With food, cells nearer to the queen of the ant are S.",
+        "homing_cue": "With food, cells are S by the levels of `{homing_cue}`.",
+        "turns_at_queen": "An ant turns around after a delivery.",
+        "delivery=terminates": "At a delivery, the target of an update is the reward alone.",
+        "delivery=truncates": "At a delivery, the target also has the value of the next state.",
+        "evaporation_in_training=no": "Pheromones do not evaporate while ants learn.",
+        "evaporation_in_evaluation=no": "Pheromones do not evaporate in the evaluation.",
+    }
 
     observation: Annotated[str, Setting("observation of an ant", choices=observations.names)] = (
         "paper"

@@ -167,7 +167,16 @@ def test_a_study_without_learning_has_no_parameters_of_learning():
     # Nothing sets these.
     unused = ("task.life.lifespan", "task.labour.demand", "task.castes.beta.threshold.value")
     assert found.keys().isdisjoint({*unused, "task.castes.beta.nest", "task.fields.a.slope"})
-    assert "Q(s, a)" not in text
+    # What referees found in earlier descriptions.
+    assert "Ants do not learn. They follow the policy trail_follower." in text
+    assert "The rewards are" not in text
+    assert (
+        "*Caste `alpha`.* Only nest 0 has it. Without food, its ants see cells as T by `trail`."
+        in (text)
+    )
+    assert "With food, its ants see cells as S by `a`." in text
+    assert "Ants without food see cells as T by the levels of `a`." in text
+    assert "A deposit sets the level of a cell: `c = 100, 200`." in text
     assert "| castes of ants | 2: alpha, beta |" in text
     assert "| cell | level of `a` | at least 0 | level |" in text
     assert "| `entropy.a` | entropy of each pheromone field" in text
@@ -177,10 +186,13 @@ def test_carriers_follow_has_its_value():
     task = Task().replace(
         choice={"rule": "deneubourg", "carriers_follow": "home"}, fields={"home": {}}
     )
-    found = values_in(of_task(task))
+    text = of_task(task)
+    found = values_in(text)
     assert found["task.choice.carriers_follow"] == "home"
     assert (found["task.choice.k"], found["task.choice.exponent"]) == ("20", "2")
     assert found.keys().isdisjoint({"task.choice.temperature", "evaluation_epsilon"})
+    assert "Ants with food compare the levels of `home`." in text
+    assert "ε" not in text
 
 
 def test_points_that_differ_have_all_values_of_those_that_use_a_setting():
@@ -223,6 +235,38 @@ def test_events_have_their_values_over_all_points():
     }
     assert values_in(text)["evaluation_epsilon"] == "0.25"
     assert "| `at.1.tick` | 100, 200 | ticks of the episode | time of the event |" in text
+
+
+def test_each_sentence_is_said_where_its_settings_hold():
+    """Every sentence of a task names settings of its group; some points have some of them."""
+    task = foraging().replace(
+        castes={"a": {"share": 0.25, "threshold": 4, "nest": 0}, "b": {"lays": "none"}},
+        labour="thresholds",
+        noise={"slip": 0.25},
+        life={"births": True, "lifespan": 90},
+    )
+    text = of_task(task, capacity=50)
+    for said in (
+        "With probability 0.25, an ant executes any of the five actions",
+        "An ant dies at the age of 90 ticks",
+        "rises by 1 per tick, and falls by 10 with each delivery",
+        "The threshold of its ants is 4.",
+        "Its ants lay these pheromones: none.",
+        "An ant with food that wins a cell changes places",
+        "ants are born and die",
+    ):
+        assert said in text
+    assert "| ant | age | at least 0 | ticks |" in text
+    assert "food grows back" not in text
+    text = text_of(
+        *(
+            RunPoint(worlds.paper(), Task().replace(noise={"slip": p}), SARSA, 9, 9)
+            for p in (0, 0.5)
+        )
+    )
+    assert "In some of the points: With probability 0.5, an ant executes" in text
+    assert "ants are born" not in text
+    assert "*Traffic.*" not in text
 
 
 def test_rows_of_tables_have_as_many_cells_as_their_heads():
