@@ -8,11 +8,11 @@ places in a tick at which hooks run.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
+from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -103,7 +103,7 @@ class KernelFunction:
         import taichi as ti
 
         # Views of ants and nests, which are arguments of hooks, are no values of the kernel.
-        views = {"a", "nest"} & inspect.signature(self.body).parameters.keys()
+        views = {"a", "nest"} & signature(self.body).parameters.keys()
         self.body.__annotations__ = dict.fromkeys(views, ti.template())
         return ti.func(self.body)
 
@@ -198,14 +198,17 @@ class Feature:
             return getattr(chosen, self.switch) != getattr(default, self.switch)
         return chosen != default
 
-    def hook(self, body: Function) -> KernelFunction:
-        """Register a hook at the point of its name, as a decorator."""
-        given = " ".join(inspect.signature(body).parameters)
-        expected = POINTS[body.__name__].arguments
-        if given != expected:
-            raise TypeError(f"{self.name}.{body.__name__} has ({given}), not ({expected})")
-        self.hooks[body.__name__] = KernelFunction(body)
-        return self.hooks[body.__name__]
+    def at(self, point: str) -> Callable[[Function], KernelFunction]:
+        """Register a function as the hook at a point, as a decorator."""
+
+        def register(body: Function) -> KernelFunction:
+            given, expected = " ".join(signature(body).parameters), POINTS[point].arguments
+            if given != expected:
+                raise TypeError(f"{body.__name__} has ({given}), but {point} needs ({expected})")
+            self.hooks[point] = KernelFunction(body)
+            return self.hooks[point]
+
+        return register
 
     def input(self, meaning: str, by_deliveries: bool = False) -> Callable[[Function], Function]:
         """Register a function of an ant as an input of your rules, as a decorator."""

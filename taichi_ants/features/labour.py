@@ -211,8 +211,8 @@ LABOUR = Feature(
 )
 
 
-@LABOUR.hook
-def born(a):
+@LABOUR.at("born")
+def draw_threshold(a):
     """Draw the threshold of an ant, which is idle if it has one."""
     distribution = ti.cast(a.distribution, ti.i32)
     value, spread = a.value, a.spread
@@ -240,8 +240,8 @@ def born(a):
     a.idle = ti.cast(distribution != _NONE, ti.i8)
 
 
-@LABOUR.hook
-def choose(a, stream):
+@LABOUR.at("choose")
+def stay_idle(a, stream):
     """Let an idle ant start foraging or not."""
     idle, after = ti.cast(a.idle, ti.i32), stream
     if idle == 1:
@@ -258,21 +258,21 @@ def choose(a, stream):
     return idle, after
 
 
-@LABOUR.hook
-def rests(a):
+@LABOUR.at("rests")
+def is_idle(a):
     """Return whether the ant is idle."""
     return ti.cast(a.idle, ti.i32)
 
 
-@LABOUR.hook
-def delivered(nest, n):
+@LABOUR.at("delivered")
+def relieve(nest, n):
     """Lower the stimulus of a nest."""
     lowered = nest.stimulus - nest.task.labour.relief * ti.cast(n, ti.f64)
     nest.stimulus = ti.select(lowered > 0.0, lowered, ti.f64(0.0))
 
 
-@LABOUR.hook
-def acted(a):
+@LABOUR.at("acted")
+def stop(a):
     """Let a forager without food next to its queen stop, by a draw."""
     chance, stops = a.stop_probability, False
     if chance > 0.0 and a.carries == 0:
@@ -286,14 +286,14 @@ def acted(a):
     return stops
 
 
-@LABOUR.hook
-def stopped(a):
+@LABOUR.at("stopped")
+def become_idle(a):
     """Make the ant idle."""
     a.idle = ti.i8(1)
 
 
-@LABOUR.hook
-def tick_ended(nest):
+@LABOUR.at("tick_ended")
+def demand(nest):
     """Raise the stimulus of a nest."""
     nest.stimulus = nest.stimulus + nest.task.labour.demand
 

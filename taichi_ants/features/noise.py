@@ -45,8 +45,8 @@ SLIP = Feature(Noise, switch="slip", probabilities=("slip",), runs_alone=True)
 MISREAD = Feature(Noise, switch="misread", probabilities=("misread",), runs_alone=True)
 
 
-@SLIP.hook
-def execute(a, action, stream):
+@SLIP.at("execute")
+def slip(a, action, stream):
     """Let the ant execute another action than it chose."""
     after = bits.advance(stream)
     words = bits.bits_of(after)
@@ -54,8 +54,8 @@ def execute(a, action, stream):
     return ti.select(slips, bits.below(bits.low_word(words), _ACTIONS), action), after
 
 
-@MISREAD.hook
-def see(a, code, stream):
+@MISREAD.at("see")
+def misread(a, code, stream):
     """Let the ant see another code than the cell has."""
     after = bits.advance(stream)
     words = bits.bits_of(after)

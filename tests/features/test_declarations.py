@@ -43,11 +43,11 @@ def test_twins_have_the_points_of_the_hooks():
 def test_a_hook_has_the_arguments_of_its_point():
     feature = Feature(Noise)
     with pytest.raises(
-        TypeError, match=r"noise\.execute has \(a action\), not \(a action stream\)"
+        TypeError, match=r"tremble has \(a action\), but execute needs \(a action stream\)"
     ):
 
-        @feature.hook
-        def execute(a, action):
+        @feature.at("execute")
+        def tremble(a, action):
             return action
 
 
