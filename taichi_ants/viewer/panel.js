@@ -106,7 +106,7 @@ class Panel {
   groupsOf({ nest, caste, marks }) {
     const { castes, nests } = this.history.header;
     const shown = this.history.header.marks.map(({ words, most }, k) =>
-      most === null ? (marks[k] > 127 ? words : "") : `${words} ${plain(Math.round(most * (1 - marks[k] / 255)))}`);
+      most === null ? (marks[k] > 127 ? words : "") : `${words} ${Math.round(most * (1 - marks[k] / 255))}`);
     const words = [...(nests > 1 ? [`nest ${nest}`] : []), ...(castes.length ? [castes[caste]] : []), ...shown.filter(Boolean)];
     return words.length ? `<span class="label groups">${safe(words.join(" · "))}</span>` : "";
   }
