@@ -113,11 +113,6 @@ class DeclaredSetting(NamedTuple):
         return issubclass(self.kind, Settings)
 
     @property
-    def is_text(self) -> bool:
-        """Whether the setting is a text of any words, such as the name of a field."""
-        return self.kind is str and not self.allowed_words
-
-    @property
     def has_names(self) -> bool:
         """Whether the setting is a class of settings with named values."""
         return self.is_group and bool(self.kind.named())  # type: ignore[attr-defined]
