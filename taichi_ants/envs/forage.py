@@ -79,11 +79,11 @@ class LoneAnts(Ants):
         seed_of = {i: seed for i, seed in enumerate(seeds) if which[i] and seed is not None}
         if seed_of:
             self.batched.seed(list(seed_of.values()), np.array(list(seed_of)))
-        self.batched.begin(which)
+        self.batched.step(0, np.where(which, Command.BEGIN, Command.WAIT))
 
     def advance(self, actions: np.ndarray, waiting: np.ndarray) -> Step:
         begins = waiting if self.mode is AutoresetMode.NEXT_STEP else 0
-        self.batched.step(actions, begins, same_step=self.mode is AutoresetMode.SAME_STEP)
+        self.batched.step(actions, begins, _AFTER_END[self.mode])
         arrays = self.batched.arrays
         results = arrays["results"]
         return arrays["rewards_of"].copy(), results & TERMINATED != 0, results & TRUNCATED != 0

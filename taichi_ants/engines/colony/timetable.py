@@ -47,16 +47,12 @@ class Timetable:
                 intervention.check_in(colony.worlds[0], colony.task, colony.learns)
 
     def __enter__(self) -> None:
-        if not self._events:
-            return
         colony = self._colony
         self._interventions = Interventions(colony, lasting=False)
         self._done: dict[int, np.ndarray] = {}  # by event: the worlds in which it has happened
         self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
 
     def __exit__(self, *_: object) -> None:
-        if not self._events:
-            return
         colony, (task, training, epsilon, learning_rate) = self._colony, self._before
         if colony.task != task:
             Interventions(colony, lasting=False).set_task(task)

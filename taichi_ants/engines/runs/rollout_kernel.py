@@ -13,14 +13,7 @@ from typing import Any
 import taichi as ti
 
 from taichi_ants.engines.layout import EXTRA_CELLS, TERMINATED, TRUNCATED, Command
-from taichi_ants.engines.runs.step import (
-    Ant,
-    Rules,
-    act,
-    observe_function,
-    reason_of,
-    restore,
-)
+from taichi_ants.engines.runs.step import Ant, Rules, act, observe_function, reason_of, restore
 from taichi_ants.task.constants import PICK_UP
 from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.rules.delivery import step_end
@@ -33,14 +26,10 @@ WIDTH, LENGTH = 512, 64
 # Codes between the steps of an ant: with a power of two, all of them would compete for the same
 # lines of the cache.
 _STRIDE = WIDTH + 8
+CODES_OF_CHUNK = LENGTH * _STRIDE  # of `WIDTH` ants
 # A code is an i64: the state, and from these bits on the result of the step (`layout.TERMINATED`)
 # and the action.
 _RESULT, _ACTION = 32, 40
-
-
-def size_of_codes(n: int) -> int:
-    """Return the number of codes that the kernel needs for n ants."""
-    return -(-n // WIDTH) * LENGTH * _STRIDE
 
 
 @cache
