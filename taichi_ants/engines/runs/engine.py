@@ -67,12 +67,7 @@ class RunState(Record):
     learning_rate: np.ndarray
 
     @classmethod
-    def empty(
-        cls,
-        shape: tuple[int, ...],
-        n_states: int,
-        memory: Memory = Memory(),  # noqa: B008
-    ) -> RunState:
+    def empty(cls, shape: tuple[int, ...], n_states: int, memory: Memory) -> RunState:
         """Return a state of zeros for runs of this shape."""
         return cls(
             q=np.zeros((*shape, 1 + memory.tables, n_states, ROW), dtype=np.float32),
@@ -204,7 +199,7 @@ class Runs:
         epsilon: float,
     ) -> Runs:
         """Return runs that follow tables (n, n_states, 5) in the rollouts of these `numbers`."""
-        state = RunState.empty((len(tables),), task.n_states)
+        state = RunState.empty((len(tables),), task.n_states, Memory())
         state.q[:, 0, :, :N_ACTIONS] = tables
         state.epsilon[:] = epsilon
         words = np.array(seeds, dtype=object)
