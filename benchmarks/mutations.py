@@ -289,7 +289,7 @@ MUTATIONS = [
         STUDIES,
     ),
     ("studies/store.py", "if all(parts_of(name, block", "if any(parts_of(name, block", STUDIES),
-    ("studies/store.py", "np.nan if array.dtype.kind", "0 if array.dtype.kind", GROWING),
+    ("studies/store.py", "np.nan if array.dtype.kind", "0 if array.dtype.kind", STUDIES),
     ("studies/study.py", "(indices, -(-len(indices) // most))", "(indices, 1)", STUDIES),
     ("studies/study.py", "- work / 2", "", STUDIES),
     ("studies/study.py", "chain(point)[0]", "chain(point)[-1]", STUDIES),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import signal
 import sys
 from pathlib import Path
@@ -162,11 +161,6 @@ def test_an_interruption_that_a_library_swallows_is_found_later(capsys):
     with pytest.raises(SystemExit) as end:  # the next command starts afresh
         run_command(lambda: progress_bar("title").__enter__()(0.1))
     assert end.value.code == 0
-
-
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
 
 
 def test_plugins_are_executed(tmp_path, monkeypatch):
