@@ -170,12 +170,15 @@ def test_a_folder_of_something_else_is_left_alone(sweep):
     assert sorted(path.name for path in Path("a").iterdir()) == ["manifest.json", "runs.csv"]
 
 
-def test_a_table_that_was_changed_or_removed_is_written_again(sweep, monkeypatch):
+@pytest.mark.parametrize("change", ["appended", "removed"])
+def test_a_table_that_was_changed_or_removed_is_written_again(change, sweep, monkeypatch):
     assert sweep(RUNS, "a")[0] == 0
     before = contents(Path("a"))
-    with open("a/runs.csv", "a") as file:
-        file.write("0,0,0,0,0\n")
-    Path("a/summary.csv").unlink()
+    if change == "appended":
+        with open("a/runs.csv", "a") as file:
+            file.write("0,0,0,0,0\n")
+    else:
+        Path("a/summary.csv").unlink()
     monkeypatch.setattr(RunPoint, "compute", None)
     assert sweep(RUNS, "a")[::2] == (0, "")
     after = contents(Path("a"))
