@@ -445,7 +445,7 @@ def write(file: Path, text: str) -> None:
 
 
 def fails(place: Path, tests: str) -> bool:
-    """Return whether tests fail in a copy of the project, or take too long."""
+    """Return whether tests fail or cannot be imported in a copy of the project, or take too long."""
     environment = {**os.environ, "PYTHONPATH": str(place)}
     command = [sys.executable, "-m", "pytest", "-x", "-n0", "-p", "no:cacheprovider", tests]
     options = {"capture_output": True, "text": True, "timeout": TIMEOUT}
@@ -453,7 +453,7 @@ def fails(place: Path, tests: str) -> bool:
         done = subprocess.run(command, cwd=place, env=environment, **options)
     except subprocess.TimeoutExpired:
         return True
-    if done.returncode > 1:  # a failure of pytest itself, such as a missing file
+    if done.returncode > 2:  # a failure of pytest itself, such as a missing file
         raise SystemExit(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
     return bool(done.returncode)
 

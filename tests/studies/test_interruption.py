@@ -150,7 +150,6 @@ class Interrupting:
                 signal.raise_signal(signal.SIGINT)
 
 sys.meta_path.insert(0, Interrupting())
-sys.argv = ["script", "--help"]
 {start}
 """
 
@@ -158,9 +157,10 @@ sys.argv = ["script", "--help"]
 @pytest.mark.parametrize("name", COMMANDS)
 def test_while_a_command_is_imported(name, tmp_path):
     """Not before its first import: Python itself and what little that one needs come before it."""
-    start = f"runpy.run_path({str(EXPERIMENTS / f'{name}.py')!r}, run_name='__main__')"
+    path = str(EXPERIMENTS / f"{name}.py")
+    start = f"sys.argv = ['', '--help']\nrunpy.run_path({path!r}, run_name='__main__')"
     if name == "taichi-ants":
-        start = "runpy.run_module('taichi_ants', run_name='__main__', alter_sys=True)"
+        start = "sys.argv[1:] = ['sweep', 'a']\nrunpy.run_module('taichi_ants', {}, '__main__')"
     script = COUNTING.format(imports=(1, 8, 30)[COMMANDS.index(name) % 3], start=start)
     done = subprocess.run(
         [sys.executable, "-c", script],
