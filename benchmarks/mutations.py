@@ -445,7 +445,7 @@ def write(file: Path, text: str) -> None:
 
 
 def fails(place: Path, tests: str) -> bool:
-    """Return whether tests fail or cannot be imported in a copy of the project, or take too long."""
+    """Return whether tests fail in a copy of the project, cannot be imported, or take too long."""
     environment = {**os.environ, "PYTHONPATH": str(place)}
     command = [sys.executable, "-m", "pytest", "-x", "-n0", "-p", "no:cacheprovider", tests]
     options = {"capture_output": True, "text": True, "timeout": TIMEOUT}
