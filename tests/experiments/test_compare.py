@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from command_lines import (
     EXPERIMENTS,
+    assert_one_sentence,
     call,
     contents,
     load,
@@ -234,3 +235,36 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
     assert f"hysteretic *, terminates: 0.1 / {best} / 0.3 / 0.9" in page
     assert "the discount is 1.0; it must be at least 0 and below 1" in page
     assert max(len(line) for line in out.splitlines()[:-2]) < 80
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["--learners", "td_zero"], ["td_zero", "q_learning", "sarsa", "dyna_q"]),
+        (["--epsilons", "0.3", "nan"], ["epsilon", "nan"]),
+        (["--training.n-steps", "2"], ["`training.n_steps` is not a hyperparameter of q_learning"]),
+        (["--training.planning-steps", "2"], ["use --planning-steps"]),
+        (["--task.delivery", "truncates"], ["--task.delivery"]),
+        (["--seeds", "1000000"], ["--seeds", "1000000"]),
+        (["--learner", "sarsa"], ["--learner"]),  # no abbreviations: they change their meaning
+        (["--world", "mars"], ["'mars'", "open", "paper"]),
+        (["--world", "no_way.txt"], ["no_way.txt", "cannot reach any food"]),
+        (["--world.seed", "0"], ["--world.seed", "'paper'", "open"]),
+        (["--out", "full"], ["'full'", "--force"]),
+    ],
+)
+def test_refusals_are_one_sentence_and_leave_nothing_behind(
+    arguments, named, tmp_path, monkeypatch, compare
+):
+    monkeypatch.chdir(tmp_path)
+    Path("no_way.txt").write_text("Q\n\n#\n\nF\n")
+    Path("full").mkdir()
+    Path("full/diary.txt").write_text("not a result")
+    before = contents(tmp_path)
+    status, out, err = compare(*TINY, "--out", "a/new/folder", *arguments)
+    assert (status, out) == (2, "")
+    assert_one_sentence(err)
+    for word in named:
+        assert word in err
+    assert contents(tmp_path) == before
+    assert not Path("a").exists()
