@@ -12,14 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from command_lines import (
-    assert_one_sentence,
-    assert_same_results,
-    call,
-    contents,
-    promptly,
-    start,
-)
+from command_lines import assert_one_sentence, assert_same_results, call, contents, promptly, start
 
 from taichi_ants.studies.folder import sessions_in, status, write_json
 from taichi_ants.studies.points import ColonyPoint, RunPoint

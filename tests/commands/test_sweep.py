@@ -7,14 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_lines import (
-    EXPERIMENTS,
-    assert_one_sentence,
-    call,
-    contents,
-    numbers_in,
-    read_csv,
-)
+from command_lines import EXPERIMENTS, assert_one_sentence, call, contents, numbers_in, read_csv
 
 from taichi_ants import (
     AntsError,
@@ -465,7 +458,7 @@ def test_a_design_has_rows_of_drawn_values_indices_and_figures(sweep):
     assert {row["task.noise.misread"] for row in rows} == {0.01}
     indices = numbers_in(folder / "sensitivity.csv")
     assert [(row["measure"], row["setting"].rpartition(".")[2]) for row in indices][:3] == [
-        *(("blocked", "half_life"), ("blocked", "view"), ("blocked", "slip")),
+        *(("blocked", "half_life"), ("blocked", "view"), ("blocked", "slip"))
     ]
     assert all(0 <= row["seed_share"] <= 1 for row in indices)
     assert "20 points of the design 'sobol'; the 10 with the highest blocked:" in out

@@ -9,15 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_lines import (
-    EXPERIMENTS,
-    assert_one_sentence,
-    call,
-    contents,
-    load,
-    read_csv,
-    run,
-)
+from command_lines import EXPERIMENTS, assert_one_sentence, call, contents, load, read_csv, run
 from paper import process
 
 from taichi_ants import Task, TrainingConfig, evaluate, train, worlds

@@ -11,12 +11,7 @@ import pytest
 from taichi_ants import worlds
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
-from taichi_ants.studies.command_line import (
-    Parser,
-    progress_bar,
-    run_command,
-    whole_number,
-)
+from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.studies.plugins import load_code, load_plugin, read_plugin
 
 
@@ -43,15 +38,9 @@ def refused(parser, arguments, capsys):
 def test_values_and_defaults(parser):
     arguments = ["--size", "9", "--seed", "-4", "--count", "2", "--rates", "1", "2", "3", "--loud"]
     parsed = vars(parser.parse_args(arguments))
-    assert parsed == {
-        **{"size": 9, "seed": -4, "count": 2, "rates": [1.0, 2.0, 3.0]},
-        "loud": True,
-    }
+    assert parsed == {**{"size": 9, "seed": -4, "count": 2, "rates": [1.0, 2.0, 3.0]}, "loud": True}
     parsed = vars(parser.parse_args([]))
-    assert parsed == {
-        **{"size": 3, "seed": 0, "count": None, "rates": (0.1, 2.0)},
-        "loud": False,
-    }
+    assert parsed == {**{"size": 3, "seed": 0, "count": None, "rates": (0.1, 2.0)}, "loud": False}
 
 
 def test_what_was_given_is_told_even_where_it_is_the_default(parser):
