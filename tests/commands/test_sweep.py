@@ -342,7 +342,6 @@ def test_a_protocol_is_part_of_the_points_of_a_sweep(sweep, tmp_path):
     assert facts["protocol"][1][0]["at"]["remove_ants"] == {"share": 0.5}
 
 
-IN_TRAINING = "in [[at]] number 1, in the training, the"
 WRONG_EVENTS = {
     "tick": ("tick = 20", "tick = 60", ["`at.tick` is 60, but episodes have 60 ticks"]),
     "name": ("trail = 0", "trial = 0", ["in [[at]] number 1, `at.trial` is not a setting"]),
@@ -352,7 +351,6 @@ WRONG_EVENTS = {
         "learning_rate",
         ["in [[at]] number 1, in the evaluation, the ants"],
     ),
-    "policy": ("trail = 0", 'policy = "random"', [f"{IN_TRAINING} ants of this colony learn"]),
     "one table": ("[[every]]", "[every]", ["write [[every]] in double brackets"]),
     "number": ("at.1.remove", "at.2.remove", ["in [[at]] number 2, `at.tick` is missing"]),
     "kind": ('kind = "colony"', 'kind = "runs"', ["is for kind 'colony'"]),
