@@ -94,10 +94,7 @@ WRONG = {
     "ending": (["episode", "--out", "{}/a.avi"], ".png or .gif"),
     "size": (["episode", "--size", "63x63", "--out", "{}/a.gif"], "64 and 4096"),
     "world": (["episode", "--world", "mars", "--out", "{}/a.gif"], "mars"),
-    "world seed of the paper": (
-        ["episode", "--world.seed", "3"],
-        "--world.seed has no effect on",
-    ),
+    "world seed of the paper": (["episode", "--world.seed", "3"], "--world.seed has no effect on"),
     "learner": (["episode", "--training.learner", "magic", "--out", "{}/a.gif"], "magic"),
     "training of a policy": (
         ["colony", "--policy", "a.npz", "--episodes", "5"],
