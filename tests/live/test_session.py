@@ -256,7 +256,7 @@ WRONG = [
     ({"policy": "random"}, "cannot change the policy"),
     ({"remove_ants": [0]}, "the cell 0 is outside the world"),
     ({"place": {"what": "queen", "cells": [60, 61]}}, "a single cell for the queen"),
-    ({"place": {"what": "rock", "cells": [60] * 10**6}}, "at most 400000 are allowed"),
+    ({"place": {"what": "rock", "cells": [60] * 400_001}}, "at most 400000 are allowed"),
     ({"task": {"pheromone.half_life": 9}}, "half_life` is 9.0; leave"),
     ({"ants": 41}, "ants is 41"),
 ]
