@@ -285,6 +285,16 @@ def test_wrong_edits_change_nothing():
     assert "no learning rate" in refused(follows, {"learning_rate": 0.5})
 
 
+def test_rates_that_were_set_decay_no_more():
+    session = Session(SETUPS["foraging"])
+    for edit in ({"epsilon": 0.5}, {"learning_rate": 0.4}, {"episode": {}}):
+        session.apply(edit)
+    for _ in range(4):
+        session.advance(10)
+    assert session.colony.episode > 1
+    assert (session.colony.epsilon, session.colony.learning_rate) == (0.5, 0.4)
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
