@@ -66,52 +66,14 @@ _NAMES_IN = {
     "worlds": ("World",),
 }
 __all__ = [
-    "AntsError",
-    "At",
-    "Colony",
-    "ColonyEpisodes",
-    "Dataset",
-    "Every",
-    "Field",
-    "Interventions",
-    "Life",
-    "Observation",
-    "Pheromone",
-    "Rewards",
-    "Rollouts",
-    "Task",
-    "Trace",
-    "TrainingConfig",
-    "TrainingResult",
-    "When",
-    "World",
-    "__version__",
-    "analysis",
-    "compare",
-    "continue_training",
-    "envs",
-    "evaluate",
-    "learners",
-    "load_policy",
-    "measures",
-    "offline",
-    "plot",
-    "record",
-    "record_colony",
-    "reference",
-    "rendering",
-    "rollout",
-    "rules",
-    "save_policy",
-    "states",
-    "summary",
-    "tabulate",
-    "task",
-    "testing",
-    "trace_training",
-    "train",
-    "worlds",
-]
+    "AntsError", "At", "Colony", "ColonyEpisodes", "Dataset", "Every", "Field", "Interventions",
+    "Life", "Observation", "Pheromone", "Rewards", "Rollouts", "Task", "Trace", "TrainingConfig",
+    "TrainingResult", "When", "World", "__version__", "analysis", "compare", "continue_training",
+    "envs", "evaluate", "learners", "load_policy", "measures", "offline", "plot", "record",
+    "record_colony", "reference", "rendering", "rollout", "rules", "save_policy", "states",
+    "summary", "tabulate", "task", "testing", "trace_training", "train", "worlds",
+]  # fmt: skip
+__dir__ = __all__.copy  # completion lists only public names
 
 
 def _show_pages_in_notebooks() -> None:
@@ -144,7 +106,3 @@ def __getattr__(name: str) -> object:
     if name in __all__:
         return import_module(f"taichi_ants.{'task.states' if name == 'states' else name}")
     raise AttributeError(f"module 'taichi_ants' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)

@@ -16,6 +16,7 @@ from taichi_ants.errors import (
     checked_whole,
     entries_of,
     expect,
+    refuse,
     shown,
 )
 from taichi_ants.features import LONE, refuse_unsupported
@@ -149,5 +150,5 @@ def checked_max_steps(value: int, task: Task) -> int:
 def checked_share(name: str, value: float) -> float:
     """Return a number from 0 to 1 as a float, or raise AntsError."""
     if not isinstance(value, Real) or isinstance(value, bool) or not 0 <= value <= 1:
-        raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and 1.")
+        refuse(name, value, "a number between 0 and 1")
     return float(value)

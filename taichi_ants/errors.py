@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import operator
 import reprlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
     import numpy as np
-
-
-_MOST_CHARACTERS = 1000  # in a message
 
 
 class AntsError(ValueError):
@@ -27,10 +25,15 @@ class AntsError(ValueError):
         super().__init__(without_middle(str(message)))
 
 
-def without_middle(message: str, most: int = _MOST_CHARACTERS) -> str:
+def without_middle(message: str, most: int = 1000) -> str:
     """Return a message, without its middle if it has more than `most` characters."""
     half = (most - 5) // 2
     return message if len(message) <= most else f"{message[:half]} ... {message[-half:]}"
+
+
+def refuse(name: str, value: object, allowed: str) -> NoReturn:
+    """Raise the AntsError for a value that is not allowed."""
+    raise AntsError(f"{name} is {shown(value)}; it must be {allowed}.")
 
 
 def unusable(registered: Any, fault: object) -> AntsError:
@@ -84,18 +87,10 @@ def count(number_of: int, noun: str) -> str:
     return f"{number_of} {noun}s"
 
 
-def listing(names: Iterable[str], noun: str) -> str:
-    """Return names after their noun: "field home", "fields home and sum", or "no fields"."""
-    *first, last = names or ("",)
-    if not last:
-        return f"no {noun}s"
-    return f"{noun}s {', '.join(first)} and {last}" if first else f"{noun} {last}"
-
-
 def check_one_of(name: str, value: object, allowed: Sequence[str]) -> None:
     """Raise AntsError if the value called `name` is not one of the allowed words."""
     if not isinstance(value, str) or value not in allowed:
-        raise AntsError(f"{name} is {shown(value)}; it must be one of {', '.join(allowed)}.")
+        refuse(name, value, f"one of {', '.join(allowed)}")
 
 
 def is_flag(value: object) -> bool:
@@ -106,20 +101,16 @@ def is_flag(value: object) -> bool:
 def checked_flag(name: str, value: object) -> bool:
     """Return a bool as a Python bool; AntsError for other values, even true ones like "off"."""
     if not is_flag(value):
-        raise AntsError(f"{name} is {shown(value)}; it must be True or False.")
+        refuse(name, value, "True or False")
     return bool(value)
 
 
 def whole(name: str, value: object, otherwise: str = "") -> int:
     """Return a whole number as a Python integer; AntsError for others, also bools and floats."""
-    try:
-        if is_flag(value):
-            raise TypeError
-        return operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise AntsError(
-            f"{name} is {shown(value)}; it must be a whole number{otherwise}."
-        ) from None
+    with suppress(TypeError):
+        if not is_flag(value):
+            return operator.index(value)  # type: ignore[arg-type]
+    refuse(name, value, f"a whole number{otherwise}")
 
 
 def checked_whole(
@@ -172,7 +163,7 @@ def as_array(
         form = _ARRAYS[dtype] if is_kind else f"type {np.dtype(dtype)}"
         lengths = ", ".join("n" if length is None else str(length) for length in shape or ())
         of = "" if shape is None else f" and of shape ({lengths}{',' * (len(shape) == 1)})"
-        raise AntsError(f"{name} is {shown(values)}; it must be an array of {form}{of}.")
+        refuse(name, values, f"an array of {form}{of}")
     if low is not None:
         outside = ~((array >= low) & (array <= high))
         if outside.any():
@@ -187,10 +178,8 @@ _ARRAYS = {"iu": "whole numbers", "fiu": "real numbers", "b": "True and False"}
 def check_word(name: str, value: object) -> None:
     """Raise AntsError unless the value called `name` can be a name in Python."""
     if not isinstance(value, str) or not value.isidentifier():
-        raise AntsError(
-            f"{name} is {shown(value)}; it must be a word of letters, digits and _ that does not "
-            "start with a digit."
-        )
+        allowed = "a word of letters, digits and _ that does not start with a digit"
+        refuse(name, value, allowed)
 
 
 def expect(name: str, value: object, *kinds: type) -> None:
@@ -198,7 +187,7 @@ def expect(name: str, value: object, *kinds: type) -> None:
     if not isinstance(value, kinds):
         names = (kind.__name__ for kind in kinds)
         words = [_PLAIN.get(n, f"{'an' if n[0] in 'AEIOU' else 'a'} {n}") for n in names]
-        raise AntsError(f"{name} is {shown(value)}; it must be {' or '.join(words)}.")
+        refuse(name, value, " or ".join(words))
 
 
 _PLAIN = {"str": "text", "NoneType": "None", "ndarray": "an array", "PathLike": "a path"}

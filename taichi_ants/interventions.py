@@ -12,18 +12,22 @@ cells, which can differ between the worlds of a colony.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, field
-from pathlib import Path
+from dataclasses import MISSING, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, check_one_of, count, entries_of, is_flag, shown, whole
-from taichi_ants.files.inputs import place_of
+from taichi_ants.errors import (
+    AntsError,
+    as_array,
+    check_one_of,
+    count,
+    entries_of,
+    is_flag,
+    refuse,
+)
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.learners.policies import NAMED, checked_values, load_policy
 from taichi_ants.settings import (
     Setting,
     Settings,
@@ -49,6 +53,14 @@ One = TypeVar("One", bound="ShorthandSettings")
 _MOST = 2**24  # ants, see `arguments.MAX_ANTS`
 _CELLS = Setting("cells, each [x, y, z], or the name of a region", or_region=True)
 _NAMED = {group.name: group for group in named_groups(Task)}
+_SHORT = {  # the short forms of interventions, by the setting that such a value is
+    "number": "a whole number of ants",
+    "share": "a share such as 0.5",
+    "cells": "a list of cells, the name of a region",
+    "level": "a level, which is a whole number",
+    "value": "a number",
+}
+INTERVENTIONS: dict[str, type[Intervention]] = {}
 
 
 class ShorthandSettings(Settings):
@@ -63,9 +75,7 @@ class ShorthandSettings(Settings):
     def from_dict(cls: type[One], facts: Any) -> One:
         """Return the record of a mapping of settings, or of a short form."""
         record = cls.converted(facts)
-        if not isinstance(record, cls):
-            raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
-        return record
+        return record if isinstance(record, cls) else super().from_dict(facts)
 
     @classmethod
     def converted(cls: type[One], value: Any) -> Any:
@@ -116,11 +126,18 @@ class Intervention(ShorthandSettings):
     """A change of a colony between two ticks; the path of the class is its name.
 
     `Interventions.apply` makes it. `in_all_worlds` says whether worlds of a colony share what it
-    changes.
+    changes. A class with a path is added to `INTERVENTIONS`.
     """
 
-    form = "a table of settings"
     in_all_worlds: ClassVar[bool] = False
+
+    def __init_subclass__(cls, path: str = "", short_for: tuple[str, ...] = (), **_: Any) -> None:
+        super().__init_subclass__(path)
+        cls.short_for = short_for or cls.short_for
+        *forms, last = *(_SHORT[name] for name in cls.short_for), "a table of settings"
+        cls.form = f"{', '.join(forms)}, or {last}" if forms else last
+        if path:
+            INTERVENTIONS[path] = cls
 
     def check(self) -> None:
         super().check()
@@ -147,22 +164,17 @@ class Intervention(ShorthandSettings):
         """Raise AntsError unless there are n cells; `form` says which."""
         cells: Any = self.cells  # type: ignore[attr-defined]
         if isinstance(cells, str) or len(cells) != n:
-            raise AntsError(f"`{self.path}.cells` is {shown(cells)}; give {form}.")
+            refuse(f"`{self.path}.cells`", cells, form)
 
 
-class _OfCells(Intervention):
-    form = "a list of cells, the name of a region, or a table of settings"
-    short_for = ("cells",)
-
-
-class _OfAnts(Intervention):
+@dataclass(frozen=True)
+class _OfAnts(Intervention, short_for=("number", "share", "cells")):
     """An intervention on a number of ants, a share of the living ants, or the ants on cells."""
 
-    form = (
-        "a number of ants, a share such as 0.5, a list of cells, the name of a region, or a table "
-        "of settings"
-    )
-    short_for = ("number", "share", "cells")
+    number: Annotated[int | None, Setting("number of ants", least=0, most=_MOST)] = None
+    share: Annotated[float | None, Setting("share of the living ants", least=0)] = None
+    cells: Annotated[Sequence | None, _CELLS] = None
+    nest: Annotated[int | None, Setting("nest of the ants; any if left out", least=0)] = None
 
     def check(self) -> None:
         super().check()
@@ -181,10 +193,7 @@ class RemoveAnts(_OfAnts, path="remove_ants"):
     A share is rounded to a number of ants, halves up.
     """
 
-    number: Annotated[int | None, Setting("number of ants", least=0, most=_MOST)] = None
     share: Annotated[float | None, Setting("share of the living ants", least=0, most=1)] = None
-    cells: Annotated[Sequence | None, _CELLS] = None
-    nest: Annotated[int | None, Setting("nest of the ants; any if left out", least=0)] = None
 
 
 @dataclass(frozen=True)
@@ -196,18 +205,21 @@ class AddAnts(_OfAnts, path="add_ants"):
     `nest`, nests take turns, and ants on given cells belong to the nearest queen.
     """
 
-    number: Annotated[int | None, Setting("number of ants", least=0, most=_MOST)] = None
-    share: Annotated[float | None, Setting("share of the living ants", least=0)] = None
-    cells: Annotated[Sequence | None, _CELLS] = None
     heading: Annotated[
         int | None,
         Setting("heading of the new ants; random if left out", least=0, most=N_HEADINGS - 1),
     ] = None
-    nest: Annotated[int | None, Setting("nest of the new ants", least=0)] = None
 
 
 @dataclass(frozen=True)
-class Place(_OfCells, path="place"):
+class SetAnts(Intervention, path="ants", short_for=("number",)):
+    """Set the number of living ants; ants with the highest numbers are removed first."""
+
+    number: Annotated[int, Setting("number of ants", least=1, most=_MOST)]
+
+
+@dataclass(frozen=True)
+class Place(Intervention, path="place", short_for=("cells",)):
     """Place rock or food on cells, or the queen on one cell; ants there move aside.
 
     Rock and food leave out the cells of queens, and cells whose ant has no room nearby.
@@ -229,17 +241,15 @@ class Place(_OfCells, path="place"):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
-        if self.kind is not None and not task.foods:
-            raise AntsError(
-                f"`place.kind` is {self.kind!r}, but the task has no kinds of food; leave it out, "
-                "or add kinds to `task.foods`."
-            )
         if self.kind is not None:
-            check_one_of("`place.kind`", self.kind, tuple(task.foods))
+            none = "left out, because the task has no kinds of food in `task.foods`"
+            allowed = f"one of {', '.join(task.foods)}" if task.foods else none
+            if self.kind not in task.foods:
+                refuse("`place.kind`", self.kind, allowed)
 
 
 @dataclass(frozen=True)
-class Move(_OfCells, path="move"):
+class Move(Intervention, path="move", short_for=("cells",)):
     """Move rock, food or the queen to an empty cell; an ant there moves aside.
 
     Has no effect if there is nothing to move, or the new cell is not free.
@@ -253,18 +263,15 @@ class Move(_OfCells, path="move"):
 
 
 @dataclass(frozen=True)
-class Clear(_OfCells, path="clear"):
+class Clear(Intervention, path="clear", short_for=("cells",)):
     """Remove rock and food from cells."""
 
     cells: Annotated[Sequence, _CELLS]
 
 
 @dataclass(frozen=True)
-class SetTrail(Intervention, path="trail"):
+class SetTrail(Intervention, path="trail", short_for=("level",)):
     """Set the trail, or a further field, of cells without rock; level 0 clears it."""
-
-    form = "a level, which is a whole number, or a table of settings"
-    short_for = ("level",)
 
     level: Annotated[int, Setting("trail level", least=0, most=MAX_DEPOSIT)]
     cells: Annotated[
@@ -275,16 +282,6 @@ class SetTrail(Intervention, path="trail"):
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
         check_one_of("`trail.field`", self.field, (TRAIL, *task.fields))
-
-
-@dataclass(frozen=True)
-class SetAnts(Intervention, path="ants"):
-    """Set the number of living ants; ants with the highest numbers are removed first."""
-
-    form = "a whole number of ants, or a table of settings"
-    short_for = ("number",)
-
-    number: Annotated[int, Setting("number of ants", least=1, most=_MOST)]
 
 
 @dataclass(frozen=True)
@@ -332,99 +329,38 @@ class SetTask(Intervention, path="task"):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         changed = self.changed(task)
-        castes = {name: caste.fixed for name, caste in task.castes.items()}
-        if castes != {name: caste.fixed for name, caste in changed.castes.items()}:
-            raise AntsError(
-                "the task cannot change the share, ants, nest or policy of a caste in an episode, "
-                "or whether it has thresholds; change its other numbers."
-            )
-        if Model(task, learns) != Model(changed, learns):
+        castes, new_castes = (
+            {name: caste.fixed for name, caste in one.castes.items()} for one in (task, changed)
+        )
+        if castes != new_castes or Model(task, learns) != Model(changed, learns):
             old, new = flat(task.as_dict()), flat(changed.as_dict())
             names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
             changes = (f"{name} from {old.get(name)!r} to {new.get(name)!r}" for name in names)
             raise AntsError(
                 f"the task cannot change {' and '.join(changes)} in an episode, because that "
-                "requires other kernels; change settings that kernels read as numbers, for "
-                "example pheromone.level."
+                "requires other kernels or castes; change settings that kernels read as numbers, "
+                "for example pheromone.level."
             )
 
 
-class _Rate(Intervention):
-    form = "a number"
-    short_for = ("value",)
+@dataclass(frozen=True)
+class SetEpsilon(Intervention, path="epsilon", short_for=("value",)):
+    """Set the exploration rate, which then does not decay."""
+
+    value: Annotated[Share, Setting("exploration rate")]
     in_all_worlds = True
 
 
 @dataclass(frozen=True)
-class SetEpsilon(_Rate, path="epsilon"):
-    """Set the exploration rate, which then does not decay."""
-
-    value: Annotated[Share, Setting("exploration rate")]
-
-
-@dataclass(frozen=True)
-class SetLearningRate(_Rate, path="learning_rate"):
+class SetLearningRate(Intervention, path="learning_rate", short_for=("value",)):
     """Set the learning rate, which then does not decay."""
 
     value: Annotated[Share, Setting("learning rate")]
+    in_all_worlds = True
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         if not learns:
             raise AntsError("the ants do not learn, so they have no learning rate; leave it out.")
-
-
-@dataclass(frozen=True)
-class SetPolicy(Intervention, path="policy"):
-    """Replace the policy that the ants follow; for colonies that do not learn.
-
-    In Python, a table of action values or anything with `q_values` is a short form.
-    """
-
-    form = "a policy file, the name of a hand-written policy, or a table of settings"
-
-    source: Annotated[str, Setting("policy file, or the name of a hand-written policy")]
-    table: np.ndarray | None = field(default=None, compare=False, repr=False)
-    sha256: str = ""  # of the table; "" for hand-written policies
-
-    def check(self) -> None:
-        super().check()
-        if self.source in NAMED:
-            return
-        if self.table is None:
-            if not self.source.endswith(".npz") and not Path(place_of(self.source)).exists():
-                names = ", ".join(NAMED)
-                raise AntsError(
-                    f"`policy` is {self.source!r}; it must be one of {names}, or a policy file."
-                )
-            object.__setattr__(self, "table", load_policy(self.source).q_values)
-        content = hashlib.sha256(np.ascontiguousarray(self.table, np.float32).tobytes())
-        object.__setattr__(self, "sha256", content.hexdigest())
-
-    @classmethod
-    def converted(cls, value: Any) -> Any:
-        if isinstance(value, (str, Path)):
-            return cls(str(value))
-        if isinstance(value, (Mapping, cls)):
-            return super().converted(value)
-        table = getattr(value, "q_values", value)
-        return cls("a table", np.asarray(table)) if isinstance(table, np.ndarray) else value
-
-    def as_dict(self) -> dict[str, Any]:
-        return {**super().as_dict(), **({"sha256": self.sha256} if self.sha256 else {})}
-
-    def table_for(self, task: Task) -> np.ndarray:
-        """Return the table; AntsError if it is not for the observation of the task."""
-        table = NAMED[self.source](task.observation) if self.table is None else self.table
-        return checked_values(table, task)
-
-    def check_in(self, world: World, task: Task, learns: bool) -> None:
-        if learns or not task.choice.needs_table:
-            raise AntsError(
-                f"the ants of this colony learn, are given actions, or choose without action "
-                f"values (`task.choice.rule` is {task.choice.rule!r}), so they follow no policy; "
-                'make a colony with sharing="frozen" and q_values.'
-            )
-        self.table_for(task)
 
 
 @dataclass(frozen=True)
@@ -434,22 +370,11 @@ class Episode(Intervention, path="episode"):
     in_all_worlds = True
 
 
-INTERVENTIONS: dict[str, type[Intervention]] = {
-    cls.path: cls
-    for cls in (
-        *(RemoveAnts, AddAnts, SetAnts, Place, Move, Clear, SetTrail),
-        *(SetTask, SetEpsilon, SetLearningRate, SetPolicy, Episode),
-    )
-}
-
-
 def from_dict(facts: Any) -> Intervention:
     """Return the intervention of a mapping from its name to its settings or its short form."""
     if not isinstance(facts, Mapping) or len(facts) != 1:
-        raise AntsError(
-            f"an intervention is {shown(facts)}; it must be a table with the name of one "
-            f"intervention: {', '.join(INTERVENTIONS)}."
-        )
+        names = ", ".join(INTERVENTIONS)
+        refuse("an intervention", facts, f"a table with the name of one intervention: {names}")
     ((name, settings),) = facts.items()
     check_one_of("the name of an intervention", name, tuple(INTERVENTIONS))
     return INTERVENTIONS[name].from_dict(settings)
@@ -469,14 +394,7 @@ def flat_indices(grid: AxialGrid, cells: Sequence[Any]) -> list[int]:
 
 def _checked_cells(path: str, cells: Sequence) -> tuple:
     """Return cells as triples or flat indices; AntsError if one is neither."""
-    name, checked = f"a cell of `{path}`", []
-    for cell in cells:
-        parts = entries_of(cell)
-        if parts is not None and len(parts) != 3:
-            raise AntsError(
-                f"`{path}` has the cell {shown(cell)}; a cell is three whole numbers [x, y, z]."
-            )
-        checked.append(whole(name, cell) if parts is None else tuple(whole(name, x) for x in parts))
-    if not checked:
-        raise AntsError(f"`{path}` is empty; give at least one cell.")
-    return tuple(checked)
+    rows = as_array(f"`{path}`", cells, "iu")
+    if not len(rows) or rows.shape[1:] not in ((), (3,)):
+        refuse(f"`{path}`", cells, "a list of cells, each three whole numbers [x, y, z]")
+    return tuple(rows.tolist() if rows.ndim == 1 else map(tuple, rows.tolist()))

@@ -40,7 +40,6 @@ class ProtocolEvent(ShorthandSettings):
     task: Annotated[language.SetTask | None, Setting("settings of the task to change")] = None
     epsilon: Annotated[language.SetEpsilon | None, Setting("new exploration rate")] = None
     learning_rate: Annotated[language.SetLearningRate | None, Setting("new learning rate")] = None
-    policy: Annotated[language.SetPolicy | None, Setting("policy to follow")] = None
 
     def check(self) -> None:
         super().check()

@@ -45,14 +45,11 @@ from typing import (
     get_type_hints,
 )
 
-from taichi_ants.errors import AntsError, check_word, entries_of, is_flag, shown
+from taichi_ants.errors import AntsError, check_word, entries_of, is_flag, refuse, shown
 
 Self = TypeVar("Self", bound="Settings")
 Function = TypeVar("Function", bound=Callable[..., Any])
-_KINDS: dict[type, str] = {
-    **{bool: "True or False", int: "a whole number", float: "a number"},
-    list: "a list of numbers",
-}
+_KINDS: dict[type, str] = {bool: "True or False", int: "a whole number", float: "a number"}
 
 
 @dataclass(frozen=True)
@@ -116,11 +113,6 @@ class DeclaredSetting(NamedTuple):
         return issubclass(self.kind, Settings)
 
     @property
-    def is_text(self) -> bool:
-        """Whether the setting is a text of any words, such as the name of a field."""
-        return self.kind is str and not self.allowed_words
-
-    @property
     def has_names(self) -> bool:
         """Whether the setting is a class of settings with named values."""
         return self.is_group and bool(self.kind.named())  # type: ignore[attr-defined]
@@ -128,7 +120,20 @@ class DeclaredSetting(NamedTuple):
     @property
     def allowed(self) -> str:
         """The allowed values, in the words of messages and tables."""
-        return self._kind_in_words + (f" {self._range}" if self._range else "")
+        if self.kind is str:
+            words = ", ".join(self.allowed_words)
+            registered = ", or that of a plugin" if self.rule.choices else ""
+            return f"one of {words}{registered}" if words else "text"
+        if self.kind is Named:
+            return f"a table of names, each with a {self.entry.__name__}"
+        if self.is_group:
+            words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
+            form = self.kind.form or f"a {self.kind.__name__}"  # type: ignore[attr-defined]
+            return form + (f", or one of {words}" if words else "")
+        if self.kind is list:
+            one = self.rule.or_region
+            return "a list of cells, or the name of a region" if one else "a list of numbers"
+        return f"{_KINDS[self.kind]} {self._range}".rstrip()
 
     def about(self, value: Any) -> str:
         """Return the help of the command-line option whose default is `value`."""
@@ -207,7 +212,7 @@ class DeclaredSetting(NamedTuple):
     def _refuse(self, value: Any, allowed: str) -> None:
         has_none = self.optional and self.rule.only is None and not self.is_group
         or_none = ", or None" if has_none else ""
-        raise AntsError(f"`{self.path}` is {shown(value)}; it must be {allowed}{or_none}.")
+        refuse(f"`{self.path}`", value, allowed + or_none)
 
     @property
     def allowed_words(self) -> tuple[str, ...]:
@@ -215,32 +220,13 @@ class DeclaredSetting(NamedTuple):
         return self.rule.choices() if self.rule.choices else self.words
 
     @property
-    def _kind_in_words(self) -> str:
-        if self.kind is str:
-            words = ", ".join(self.allowed_words)
-            registered = ", or that of a plugin" if self.rule.choices else ""
-            return f"one of {words}{registered}" if words else "text"
-        if self.kind is Named:
-            return f"a table of names, each with a {self.entry.__name__}"
-        if self.is_group:
-            words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
-            form = self.kind.form or f"a {self.kind.__name__}"  # type: ignore[attr-defined]
-            return form + (f", or one of {words}" if words else "")
-        if self.rule.or_region:
-            return "a list of cells, or the name of a region"
-        return _KINDS[self.kind]
-
-    @property
     def _range(self) -> str:
         rule = self.rule
-        if rule.above is not None:
-            upper = "" if rule.most is None else f" and at most {_plain(rule.most)}"
-            return f"above {_plain(rule.above)}{upper}"
         if rule.least is not None and rule.most is not None:
             return f"between {_plain(rule.least)} and {_plain(rule.most)}"
-        if rule.least is not None:
-            return f"at least {_plain(rule.least)}"
-        return "" if rule.most is None else f"at most {_plain(rule.most)}"
+        bounds = {"above": rule.above, "at least": rule.least, "at most": rule.most}
+        words = (f"{word} {_plain(n)}" for word, n in bounds.items() if n is not None)
+        return " and ".join(words)
 
 
 class Settings:
@@ -341,31 +327,25 @@ class Settings:
 
         To change a group, give a mapping of its settings; its entry "" is the value to start from.
         """
-        known = {setting.name: setting for setting in declared(type(self))}
-        changed: dict[str, Any] = {}
-        for name, value in changes.items():
-            if name not in known:
-                raise AntsError(f"`{_below(self.path, name)}` {not_a_setting(name, known)}")
-            setting = known[name]
-            if setting.kind is Named and isinstance(value, Mapping):
-                value = setting._named(value, getattr(self, name))
-            elif setting.is_group and isinstance(value, Mapping):
+        for setting in declared(type(self)):
+            name = setting.name
+            if setting.rule.only and name not in changes:
+                other, *values = setting.rule.only
+                if changes.get(other, getattr(self, other)) not in values:
+                    changes[name] = setting.default
+            elif isinstance(value := changes.get(name), Mapping) and setting.kind is Named:
+                changes[name] = setting._named(value, getattr(self, name))
+            elif isinstance(value, Mapping) and setting.is_group:
                 inner = dict(value)
                 start = setting.checked(inner.pop("")) if "" in inner else getattr(self, name)
-                value = start.replace(**inner)
-            changed[name] = value
-        for setting in known.values():
-            if setting.rule.only and setting.name not in changed:
-                other, *values = setting.rule.only
-                if changed.get(other, getattr(self, other)) not in values:
-                    changed[setting.name] = setting.default
-        return replace(self, **changed)  # type: ignore[type-var]
+                changes[name] = start.replace(**inner)
+        return replace(self, **changes)  # type: ignore[type-var]
 
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
         """Return the settings in a mapping, checked; groups are mappings or names."""
         if not isinstance(facts, Mapping):
-            raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
+            refuse(f"`{cls.path}`", facts, "a table of settings")
         return cls().replace(**facts)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from taichi_ants import learners, rules, runtime, worlds
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.errors import AntsError, checked_whole, listing
+from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.records import Snapshot
 from taichi_ants.reference import ReferenceColony
@@ -48,7 +48,8 @@ class RuleCheck(NamedTuple):
         compared = f"{self.ticks} ticks of {SEEDS} colonies"
         if self.inputs:
             compared = f"{self.inputs} drawn inputs and {compared}"
-        reads = f" (reads the {listing(self.fields, 'field')})" if self.fields else ""
+        noun = "field" if len(self.fields) == 1 else "fields"
+        reads = f" (reads the {noun} {' and '.join(self.fields)})" if self.fields else ""
         return f"{self.rule}{reads}: {compared}: {self.difference or 'equal'}"
 
 

@@ -6,16 +6,7 @@ from taichi_ants.learners.registry import get, label, names, register, with_hype
 from taichi_ants.settings import Setting
 
 __all__ = [
-    "Hyperparameters",
-    "Learner",
-    "Memory",
-    "Setting",
-    "TrainingConfig",
-    "get",
-    "label",
-    "names",
-    "register",
-    "td_learner",
-    "with_hyperparameters",
-]
+    "Hyperparameters", "Learner", "Memory", "Setting", "TrainingConfig", "get", "label", "names",
+    "register", "td_learner", "with_hyperparameters",
+]  # fmt: skip
 __dir__ = __all__.copy  # completion lists only public names

@@ -50,7 +50,8 @@ def fields() -> Iterator[dict[str, Any]]:
     """
     for setting in all_of(Task):
         # The page has no castes, which labour requires.
-        has_no_field = setting.is_group or setting.is_text or setting.kind is Named
+        is_text = setting.kind is str and not setting.allowed_words
+        has_no_field = setting.is_group or is_text or setting.kind is Named
         if not has_no_field and not setting.path.startswith(f"{Labour.path}."):
             yield _field(setting)
     for setting in declared(TrainingConfig)[1:]:

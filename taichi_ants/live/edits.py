@@ -1,8 +1,8 @@
 """Edits: the interventions that pages send, and the numbers that their sliders change.
 
 An edit is JSON, a mapping from the name of an intervention to its settings or its short form, see
-`taichi_ants.interventions`. In the log of a session, its cells are flat indices. "policy" is not
-allowed, because a page must not name files. "episode" ends the episode and begins the next one.
+`taichi_ants.interventions`. In the log of a session, its cells are flat indices. "episode" ends the
+episode and begins the next one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import numpy as np
 
 from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.errors import AntsError
 from taichi_ants.interventions import Intervention
 
 Edit = dict[str, Any]
@@ -84,11 +83,6 @@ def checked(edit: object, interventions: Interventions) -> Intervention:
     Raises:
         AntsError: The edit is not valid; the message says why.
     """
-    if isinstance(edit, Mapping) and "policy" in edit:
-        raise AntsError(
-            "a session cannot change the policy of its ants; begin a session with the other "
-            "policy, or use a Colony."
-        )
     intervention, colony = language.from_dict(edit), interventions.colony
     if (cells := getattr(intervention, "cells", None)) is None:
         return intervention

@@ -11,14 +11,7 @@ from taichi_ants.measures.registry import check_part, get, names, register
 from taichi_ants.measures.series import Series
 
 __all__ = [
-    "BUILT_IN",
-    "Measure",
-    "Run",
-    "Series",
-    "check_part",
-    "get",
-    "names",
-    "register",
+    "BUILT_IN", "Measure", "Run", "Series", "check_part", "get", "names", "register",
     "shortest_path",
-]
+]  # fmt: skip
 __dir__ = __all__.copy  # completion lists only public names

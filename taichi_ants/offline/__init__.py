@@ -11,15 +11,7 @@ from taichi_ants.offline.learners import (
 from taichi_ants.offline.recording import record, record_colony
 
 __all__ = [
-    "Dataset",
-    "EmpiricalModel",
-    "PolicyValues",
-    "batch_q_learning",
-    "fitted_q_iteration",
-    "importance_sampling",
-    "model_based",
-    "pessimistic_q_iteration",
-    "record",
-    "record_colony",
-]
+    "Dataset", "EmpiricalModel", "PolicyValues", "batch_q_learning", "fitted_q_iteration",
+    "importance_sampling", "model_based", "pessimistic_q_iteration", "record", "record_colony",
+]  # fmt: skip
 __dir__ = __all__.copy  # completion lists only public names

@@ -6,8 +6,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 import taichi_ants.interventions as language
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_INTERVENTION
 from taichi_ants.reference.ants import Ant, start_order
@@ -69,10 +67,6 @@ class Interventions:
             case language.SetTask():
                 colony.task = change.changed(colony.task)
                 world.take(colony.task, colony.learns)
-            case language.SetPolicy():
-                table = np.asarray(change.table_for(colony.task), np.float32)
-                for learner in colony.learners:
-                    learner.rows = [list(row) for row in table]
             case _:
                 self._change_cells_or_ants(change)
                 for ant in colony.ants.values():

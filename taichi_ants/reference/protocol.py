@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 
 from taichi_ants.protocol import At, Every, ProtocolEvent, When
@@ -37,16 +36,12 @@ class Protocol:
         colony.begin_episode()
         self._happened: set[int] = set()
         self._interventions = Interventions(colony)
-        tables = copy.deepcopy([learner.rows for learner in colony.learners])
-        self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate, tables
+        self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
 
     def end_episode(self) -> None:
-        """Undo changes of numbers and of policies, and end the episode."""
+        """Undo changes of numbers, and end the episode."""
         colony = self._colony
-        colony.task, colony.training, colony.epsilon, colony.learning_rate, tables = self._before
-        if not colony.learns:
-            for learner, rows in zip(colony.learners, tables, strict=True):
-                learner.rows = rows
+        colony.task, colony.training, colony.epsilon, colony.learning_rate = self._before
         colony.end_episode()
 
     def before_tick(self) -> None:

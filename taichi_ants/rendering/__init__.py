@@ -18,18 +18,7 @@ from taichi_ants.rendering.writers import (
 )
 
 __all__ = [
-    "PAUSE",
-    "Episode",
-    "Scene",
-    "Snapshot",
-    "Status",
-    "at_start",
-    "check_animation",
-    "check_picture",
-    "colony_snapshots",
-    "frames",
-    "picture",
-    "save_animation",
-    "save_picture",
-]
+    "PAUSE", "Episode", "Scene", "Snapshot", "Status", "at_start", "check_animation",
+    "check_picture", "colony_snapshots", "frames", "picture", "save_animation", "save_picture",
+]  # fmt: skip
 __dir__ = __all__.copy  # completion lists only public names

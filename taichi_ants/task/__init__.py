@@ -11,22 +11,7 @@ from taichi_ants.task.rewards import Rewards
 from taichi_ants.task.task import Life, Task, Traffic, fetching, foraging, paper, queueing
 
 __all__ = [
-    "Caste",
-    "Choice",
-    "Field",
-    "Food",
-    "Labour",
-    "Life",
-    "Noise",
-    "Observation",
-    "Pheromone",
-    "Rewards",
-    "Task",
-    "Threshold",
-    "Traffic",
-    "fetching",
-    "foraging",
-    "paper",
-    "queueing",
-]
+    "Caste", "Choice", "Field", "Food", "Labour", "Life", "Noise", "Observation", "Pheromone",
+    "Rewards", "Task", "Threshold", "Traffic", "fetching", "foraging", "paper", "queueing",
+]  # fmt: skip
 __dir__ = __all__.copy  # completion lists only public names

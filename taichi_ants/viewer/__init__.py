@@ -10,13 +10,6 @@ from taichi_ants.viewer.page import check_page, frame, notebook, page, save_page
 from taichi_ants.viewer.recorder import Recorder, record_colony, record_trace
 
 __all__ = [
-    "Recorder",
-    "Recording",
-    "check_page",
-    "frame",
-    "notebook",
-    "page",
-    "record_colony",
-    "record_trace",
-    "save_page",
-]
+    "Recorder", "Recording", "check_page", "frame", "notebook", "page", "record_colony",
+    "record_trace", "save_page",
+]  # fmt: skip

@@ -15,19 +15,7 @@ from taichi_ants.worlds.text_map import from_text, load_map, to_text
 from taichi_ants.worlds.world import World
 
 __all__ = [
-    "World",
-    "build",
-    "check_seed_counts",
-    "double_bridge",
-    "far_piles",
-    "from_text",
-    "is_drawn",
-    "load_map",
-    "names",
-    "open_world",
-    "paper",
-    "register",
-    "settings_of",
-    "to_text",
-]
+    "World", "build", "check_seed_counts", "double_bridge", "far_piles", "from_text", "is_drawn",
+    "load_map", "names", "open_world", "paper", "register", "settings_of", "to_text",
+]  # fmt: skip
 __dir__ = __all__.copy  # completion lists only public names

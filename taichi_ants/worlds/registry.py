@@ -37,10 +37,6 @@ def register(name: str, builder: Builder) -> None:
     belongs to a built-in world, or if an argument has no default.
     """
     WORLDS.check_new(name)
-    if not callable(builder):
-        raise AntsError(
-            f"the builder of {shown(name)} is {shown(builder)}; it must be a function of a seed."
-        )
     for argument in _arguments(builder).values():
         if argument.default is argument.empty and argument.name != "seed":
             raise AntsError(
@@ -78,7 +74,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **settings: Any) 
     """Return the world with a registered name or, if there is none, of a map file.
 
     The seed is any whole number, which only some builders use; `settings` are those of the world.
-    Raises AntsError if neither the name nor the file exists, or the builder fails.
+    Raises AntsError if neither the name nor the file exists.
     """
     seed = whole("seed", seed)
     expect("the world", name_or_path, str, os.PathLike)
@@ -92,14 +88,6 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **settings: Any) 
         if os.path.exists(inputs.place_of(name_or_path)):
             return load_map(name_or_path)
         raise WORLDS.unknown(os.fspath(name_or_path), "give the path of a map file that exists, ")
-    try:
-        world = builder(**settings, **({"seed": seed} if is_drawn(name_or_path) else {}))
-    except AntsError:
-        raise
-    except Exception as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise AntsError(
-            f"the builder of {shown(name_or_path)} failed with {reason}; correct it."
-        ) from error
+    world = builder(**settings, **({"seed": seed} if is_drawn(name_or_path) else {}))
     expect(f"the result of the builder of {shown(name_or_path)}", world, World)
     return world

@@ -13,17 +13,13 @@ and fourth kind.
 
 Lines that start with `;` are comments. A line `trail = 25` above the drawing sets the level of all
 trails. Ants are numbered in reading order.
-
-A line `region gate = %` above the drawing says that cells drawn as % are empty, and belong to the
-region "gate"; with `region gate = % #` they are obstacles. A cell can belong to several regions, as
-in `region gate, short = % #`, and a region can have several marks, each in its own line.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from itertools import permutations
 from typing import NamedTuple
 
@@ -44,14 +40,7 @@ ANTS_ON_TRAIL = "abcdef"
 
 _CELLS = {EMPTY, OBSTACLE, TRAIL, *FOODS, *QUEENS, *ANTS, *ANTS_ON_TRAIL}
 _ALLOWED = ". # t, F G H I, Q R S U, 0 to 5, a to f and blanks"
-_MARKS = "%*@+!$&/?:<>^~|-_gklmnopqrsuvwxyzABCDEJKLMNOPTVWXYZ6789"  # for regions, in this order
 _LEVEL = re.compile(r"\s*trail\s*=\s*([0-9]{1,10})\s*")
-_REGION = re.compile(r"\s*region\s+(\w+(?:\s*,\s*\w+)*)\s*=\s*(\S)(?:\s+(\S))?\s*")
-_LINES = (
-    f"above the drawing, write `trail = LEVEL` once, with a level from 1 to {MAX_TRAIL_LEVEL}, or "
-    f"`region NAME = MARK` or `region NAME = MARK CELL`, with a new mark such as {_MARKS[:5]}, and "
-    f"a cell that is one of {_ALLOWED}"
-)
 
 
 def load_map(path: str | os.PathLike[str]) -> World:
@@ -66,19 +55,13 @@ def from_text(text: str, source: str = "the map") -> World:
     AntsError, which calls the text `source`, if the map is damaged.
     """
     expect(source, text, str)
-    level, regions, drawn = _read(text, source)
+    level, drawn = _read(text, source)
     ranges, cells = _placed(drawn, source)
     grid = AxialGrid(ranges)
     undrawn = grid.exists.copy()
     undrawn[grid.index(cells)] = False
 
     marks = np.array([character.mark for character in drawn])
-    within = {
-        name: cells[np.isin(marks, [mark for mark in regions if name in regions[mark].names])]
-        for region in regions.values()
-        for name in region.names
-    }
-    marks = np.array([regions[mark].cell if mark in regions else mark for mark in marks])
     queens = [mark for mark in marks if mark in QUEENS]
     if sorted(queens) != [*QUEENS[: max(1, len(queens))]]:
         listed = f"the queens {' '.join(queens)}" if queens else "no queen"
@@ -98,7 +81,6 @@ def from_text(text: str, source: str = "the map") -> World:
         obstacles=np.concatenate([cells[marks == OBSTACLE], grid.cells(np.flatnonzero(undrawn))]),
         trails=np.column_stack([trails, np.full(len(trails), level)]),
         ants=np.column_stack([cells[is_ant], np.array(headings, dtype=np.int64)]),
-        regions=within,
     )
 
 
@@ -120,51 +102,31 @@ class _Character(NamedTuple):
         return f"line {self.line}, column {self.column + 1} of {source} has {self.mark!r}"
 
 
-class _Mark(NamedTuple):
-    """A mark of regions: the character of the cell that it draws, and the names of the regions."""
-
-    cell: str
-    names: tuple[str, ...]
-
-
-def _read(text: str, source: str) -> tuple[int, dict[str, _Mark], list[_Character]]:
-    """Return the level of trails, the regions by mark, and the characters of the drawing."""
-    level, row = None, 0
-    regions: dict[str, _Mark] = {}
+def _read(text: str, source: str) -> tuple[int, list[_Character]]:
+    """Return the level of trails, and the characters of the drawing."""
+    level, row = 0, 0
     drawn: list[_Character] = []
     text = text.removeprefix("\ufeff")  # the byte-order mark, which some editors write
     for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1):
         if line.lstrip().startswith(";"):
             continue
         if "=" in line:
-            read_level = _LEVEL.fullmatch(line) if level is None and not drawn else None
-            read_region = {} if drawn else _read_region(line, regions)
-            if read_level and 1 <= int(read_level[1]) <= MAX_TRAIL_LEVEL:
-                level = int(read_level[1])
-            elif read_region:
-                regions |= read_region
-            else:
-                where = f"line {number} of {source}"
-                raise AntsError(f"{where} is {shown(line.strip())}; {_LINES}.")
+            read = None if level or drawn else _LEVEL.fullmatch(line)
+            level = int(read[1]) if read else 0
+            if not 1 <= level <= MAX_TRAIL_LEVEL:
+                raise AntsError(
+                    f"line {number} of {source} is {shown(line.strip())}; above the drawing, write "
+                    f"`trail = LEVEL` once, with a level from 1 to {MAX_TRAIL_LEVEL}."
+                )
             continue
         row += 1
         drawn += [_Character(m, number, row, column) for column, m in enumerate(line) if m != " "]
     for character in drawn:
-        if character.mark not in _CELLS and character.mark not in regions:
+        if character.mark not in _CELLS:
             raise AntsError(f"{character.described(source)}; use only {_ALLOWED}.")
     if not drawn:
         raise AntsError(f"{source} has no cells; draw cells with {_ALLOWED}.")
-    return level or DEFAULT_TRAIL_LEVEL, regions, drawn
-
-
-def _read_region(line: str, regions: Mapping[str, _Mark]) -> dict[str, _Mark]:
-    """Return the mark of a line such as `region gate = % #`; empty if the line is wrong."""
-    read = _REGION.fullmatch(line)
-    names, mark, cell = read.groups(EMPTY) if read else ("", "", "")
-    words = tuple(name.strip() for name in names.split(","))
-    is_new = mark not in _CELLS and mark not in regions and mark not in "=;"
-    fits = is_new and cell in _CELLS and all(map(str.isidentifier, words))
-    return {mark: _Mark(cell, words)} if fits else {}
+    return level or DEFAULT_TRAIL_LEVEL, drawn
 
 
 def _placed(drawn: list[_Character], source: str) -> tuple[tuple[int, int, int], np.ndarray]:
@@ -239,48 +201,21 @@ def to_text(world: World) -> str:
         (f"{world.n_nests} nests", world.n_nests > len(QUEENS)),
         (f"{world.n_food_kinds} kinds of food", world.n_food_kinds > len(FOODS)),
         ("a trail under the queen or food", bool(hidden)),
+        ("regions", bool(world.regions)),
     ):
         if is_there:
             raise AntsError(f"a map cannot show {what}; change this in the world.")
     marks = [(world.grid.cells(np.flatnonzero(world.grid.exists)), EMPTY)]
     kinds = world.kinds_by_cell()[world.grid.index(world.foods)]
-    marks += [(world.obstacles, OBSTACLE)]
+    marks.append((world.obstacles, OBSTACLE))
     marks += [(world.foods[kinds == kind], FOODS[kind]) for kind in range(world.n_food_kinds)]
     marks += [(cell[None], QUEENS[nest]) for nest, cell in enumerate(world.queens)]
     marks += [(world.trails[:, :3], TRAIL)]
     for *cell, heading in world.ants.tolist():
         letters = ANTS_ON_TRAIL if tuple(cell) in on_trail else ANTS
         marks.append((np.array([cell]), letters[heading]))
-    lines = [f"trail = {level}" for level in levels]
-    if world.regions:
-        more, named = _marks_of_regions(world, marks)
-        lines, marks = [*lines, *named], [*marks, *more]
-    return "".join(f"{line}\n" for line in lines) + drawing(world.ranges, marks)
-
-
-def _marks_of_regions(
-    world: World, marks: Iterable[tuple[np.ndarray, str]]
-) -> tuple[list[tuple[np.ndarray, str]], list[str]]:
-    """Return the marks of the cells in regions, and the lines that explain them."""
-    drawn = {tuple(cell): mark for cells, mark in marks for cell in cells.tolist()}
-    inside: dict[tuple[int, ...], list[str]] = {}
-    for name, cells in world.regions.items():
-        for cell in map(tuple, cells.tolist()):
-            inside.setdefault(cell, []).append(name)
-    groups: dict[tuple[str, ...], list[tuple[int, ...]]] = {}
-    for cell, names in sorted(inside.items()):
-        groups.setdefault((drawn[cell], *names), []).append(cell)
-    if len(groups) > len(_MARKS):
-        raise AntsError(
-            f"the regions have {len(groups)} kinds of cells, but a map can show {len(_MARKS)}; "
-            "leave out some regions."
-        )
-    legend, lines = [], []
-    for mark, ((cell_mark, *names), group) in zip(_MARKS, groups.items(), strict=False):
-        legend.append((np.array(group), mark))
-        end = "" if cell_mark == EMPTY else f" {cell_mark}"
-        lines.append(f"region {', '.join(names)} = {mark}{end}")
-    return legend, lines
+    lines = (f"trail = {level}\n" for level in levels)
+    return "".join(lines) + drawing(world.ranges, marks)
 
 
 def drawing(ranges: tuple[int, int, int], marks: Iterable[tuple[np.ndarray, str]]) -> str:

@@ -79,8 +79,9 @@ class World:
     ) -> None:
         others = np.asarray(other_queens).tolist()
         grid = AxialGrid(validation.parse_ranges(ranges))
+        parts = {"foods": foods, "obstacles": obstacles, "trails": trails, "ants": ants}
         contents: dict[str, Any] = validation.parse_contents(
-            grid, [queen, *others] if others else queen, foods, food_kinds, obstacles, trails, ants
+            grid, [queen, *others] if others else queen, food_kinds, **parts
         )
         queens = contents.pop("queens")
         if not contents["food_kinds"].any():
@@ -197,7 +198,16 @@ class World:
         check_one_of("where", where, STARTS)
         cells, headings = self.grid.index(self.ants[:n, :3]), self.ants[:n, 3]
         if len(cells) < n:
-            placed = self._free_cells(seed, n - len(cells), cells, where)
+            free = self.ground() == EMPTY
+            free[cells] = False
+            room = len(cells) + int(np.count_nonzero(free))
+            if n > room:
+                raise AntsError(
+                    f"the number of ants is {n}; this world has room for {room}, so start fewer "
+                    "ants or choose a larger world."
+                )
+            nests = self.nests_of(n)[len(cells) :]
+            placed = free_cells(self.grid, free, self.queens, nests, seed, where)
             words = stream_state(seed, STREAM_START_HEADING, np.arange(len(cells), n))
             headings = np.concatenate([headings, choose(words >> np.uint64(32), N_HEADINGS)])
             cells = np.concatenate([cells, placed])
@@ -209,8 +219,9 @@ class World:
         A listed ant belongs to the nearest queen, or to the first of several; ant number i to nest
         i % N otherwise.
         """
-        far = np.stack([self._far(nest) for nest in range(self.n_nests)])
-        listed = far[:, self.grid.index(self.ants[:n, :3])].argmin(axis=0)
+        cells = self.grid.index(self.ants[:n, :3])
+        far = [self._far(nest)[cells] if len(cells) else cells for nest in range(self.n_nests)]
+        listed = np.argmin(far, axis=0)
         others = np.arange(len(listed), n) % self.n_nests
         return np.concatenate([listed, others]).astype(np.int32)
 
@@ -230,42 +241,6 @@ class World:
         headings = choose(stream_state(seeds, STREAM_START_HEADING, 0) >> np.uint64(32), N_HEADINGS)
         return nearest[words.argmin(axis=1)].astype(np.int32), headings.astype(np.int32)
 
-    def _free_cells(self, seed: int, n: int, taken: np.ndarray, where: str) -> np.ndarray:
-        """Return the first n free cells by distance to the queen ("nest" only), then by a hash."""
-        free = self.ground() == EMPTY
-        free[taken] = False
-        index = np.flatnonzero(free)
-        if n > len(index):
-            raise AntsError(
-                f"the number of ants is {shown(n + len(taken))}; this world has room for "
-                f"{len(index) + len(taken)}, so start fewer ants or choose a larger world."
-            )
-        if where == "nest" and self.n_nests > 1:
-            return self._cells_of_nests(seed, n, len(taken), free)
-        if where == "nest":
-            distance = self.distances()[index]
-            # Only cells up to the distance of the n-th cell need a hash and an order.
-            last = np.searchsorted(np.cumsum(np.bincount(distance)), n)
-            index, distance = index[distance <= last], distance[distance <= last]
-        words = stream_state(seed, STREAM_START_CELL, self.grid.number(self.grid.cells(index)))
-        if where == "nest":
-            return index[np.lexsort((words, distance))[:n]]
-        # The cells of the n smallest words are a sample without replacement.
-        first = np.argpartition(words, n - 1)[:n]
-        return index[first[np.argsort(words[first])]]
-
-    def _cells_of_nests(self, seed: int, n: int, n_taken: int, free: np.ndarray) -> np.ndarray:
-        """Return a free cell for each of n ants in turn, by distance to its queen, then by hash."""
-        free, (index,) = free.copy(), np.nonzero(free)
-        words = stream_state(seed, STREAM_START_CELL, self.grid.number(self.grid.cells(index)))
-        far = (self._far(nest)[index] for nest in range(self.n_nests))
-        queues = [iter(index[np.lexsort((words, steps))].tolist()) for steps in far]
-        cells = np.empty(n, np.int64)
-        for i, nest in enumerate(self.nests_of(n_taken + n)[n_taken:].tolist()):
-            cells[i] = next(cell for cell in queues[nest] if free[cell])
-            free[cells[i]] = False
-        return cells
-
     def as_dict(self) -> dict[str, Any]:
         """Return the world as names and lists of numbers; `from_dict` reads it."""
         parts = {name: getattr(self, name).tolist() for name in _PARTS}
@@ -277,10 +252,9 @@ class World:
     @classmethod
     def from_dict(cls, facts: Mapping[str, Any]) -> World:
         """Return the world of `as_dict`; raises ValueError, KeyError or TypeError."""
-        parts: dict[str, Any] = {name: np.array(facts[name]) for name in _PARTS}
-        parts |= {name: np.array(facts[name]) for name in _MORE if name in facts}
-        parts["regions"] = facts.get("regions", {})
-        return cls(facts["ranges"], facts["queen"], **parts)
+        names = (*_PARTS, *(name for name in _MORE if name in facts))
+        parts = {name: np.array(facts[name]) for name in names}
+        return cls(facts["ranges"], facts["queen"], **parts, regions=facts.get("regions", {}))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, World):
@@ -292,9 +266,9 @@ class World:
 
     @cached_property
     def _key(self) -> tuple:
+        regions = ((name, cells.tobytes()) for name, cells in self.regions.items())
         arrays = (getattr(self, name).tobytes() for name in (*_PARTS, *_MORE))
-        regions = (part for name, cells in self.regions.items() for part in (name, cells.tobytes()))
-        return (self.ranges, self.queen, *arrays, *regions)
+        return self.ranges, self.queen, *arrays, *regions
 
     def __reduce__(self) -> tuple:
         # Copies and unpickled worlds are built from their contents, so that arrays are read-only.
@@ -308,3 +282,34 @@ class World:
             f"obstacles: {len(self.obstacles)}, trails: {len(self.trails)}, "
             f"ants: {len(self.ants)})"
         )
+
+
+def free_cells(
+    grid: AxialGrid, free: np.ndarray, queens: np.ndarray, nests: np.ndarray, seed: int, where: str
+) -> np.ndarray:
+    """Return a free cell for each of n ants, of which each takes its first that is not taken.
+
+    Cells are in the order of a hash with the seed or, if `where` is "nest", by distance to the
+    queen of the ant's nest, then by hash. `free` is bool (grid.size,) with at least n free cells,
+    `queens` are the cells of queens, (nests, 3), `nests` are the nests of the ants, (n,).
+    """
+    index, n = np.flatnonzero(free), len(nests)
+    is_alone = where == "nest" and len(np.unique(nests)) == 1
+    if is_alone:
+        distance = grid.distances(tuple(queens[nests[0]].tolist()))[index]
+        # Only cells up to the distance of the n-th cell need a hash and an order.
+        near = distance <= np.searchsorted(np.cumsum(np.bincount(distance)), n)
+        index, distance = index[near], distance[near]
+    words = stream_state(seed, STREAM_START_CELL, grid.number(grid.cells(index)))
+    if is_alone:
+        return index[np.lexsort((words, distance))[:n]]
+    if where == "spread" and n:
+        # The cells of the n smallest words are a sample without replacement.
+        first = np.argpartition(words, n - 1)[:n]
+        return index[first[np.argsort(words[first])]]
+    taken: dict[int, None] = {}
+    far = (grid.distances(tuple(queen))[index] for queen in queens.tolist())
+    queues = [iter(index[np.lexsort((words, steps))].tolist()) for steps in far]
+    for nest in nests.tolist():
+        taken[next(cell for cell in queues[nest] if cell not in taken)] = None
+    return np.fromiter(taken, np.int64, n)

@@ -114,18 +114,9 @@ def test_a_finished_sweep_grows_without_repeating_anything(kind, sweep, monkeypa
 @pytest.mark.parametrize(
     ("text", "change", "words"),
     [
-        (
-            RUNS,
-            ("episodes = 6", "episodes = 7"),
-            "that this study lacks (episodes is 6 instead of 7",
-        ),
+        (RUNS, ("episodes = 6", "episodes = 7"), "study lacks (episodes is 6 instead of 7"),
         (RUNS, ("[7, 2, 5, 1]", "[7, 2, 5]"), "seeds is [7, 2, 5, 1] instead of [7, 2, 5]"),
-        (
-            DRAWN,
-            ("samples = 8", "samples = 4"),
-            "training.learning_rate is [0.",
-        ),
-        (DRAWN, ("samples = 8", "samples = 8\ndesign_seed = 3"), "design.design_seed is 0 instead"),
+        (DRAWN, ("samples = 8", "samples = 4"), "training.learning_rate is [0."),
         (DRAWN, ('"sobol"', '"random"'), "design.design is 'sobol' instead of 'random'"),
     ],
 )
@@ -225,17 +216,13 @@ def test_three_shards_have_the_bytes_of_one_run(kind, sweep):
     assert not sessions_in(Path("merged"))  # nothing was computed
 
 
-DAMAGES = {"cut": lambda content: content[:-40], "empty": lambda content: b""}
-
-
-@pytest.mark.parametrize("damage", [*DAMAGES, "bit"])
-def test_a_damaged_block_is_computed_again(damage, sweep):
+def test_a_damaged_block_is_computed_again(sweep):
     assert sweep(RUNS, "plain")[0] == 0
     assert sweep(RUNS, "a")[0] == 0
     path, *_ = sorted(Path("a/blocks").iterdir())
     content = bytearray(path.read_bytes())
     content[content.rindex(b"\x93NUMPY") + 130] ^= 1  # after NumPy's 128 bytes
-    path.write_bytes(content if damage == "bit" else DAMAGES[damage](path.read_bytes()))
+    path.write_bytes(content)
     Path("a/runs.csv").unlink()
     status, _, err = sweep(RUNS, "a")
     assert status == 0
@@ -248,7 +235,7 @@ def test_a_damaged_block_is_computed_again(damage, sweep):
     assert "'a/study.json' is damaged; remove it and run the command" in err
 
 
-@pytest.mark.parametrize("shard", ["4/3", "0/3", "2", "a/b", "1/0", "-1/3"])
+@pytest.mark.parametrize("shard", ["4/3", "0/3", "2", "a/b"])
 def test_shards_that_do_not_exist_are_refused(shard, sweep):
     status, _, err = sweep(RUNS, "a", f"--shard={shard}")
     assert status == 2

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import frozen_rules
 import numpy as np
 from random_castes import with_castes
 from random_choices import NOISE, random_choice, random_noise
@@ -97,19 +98,20 @@ PER_GROUP = 12
 
 
 def colonies_of(name: str, most: int = PER_GROUP) -> Iterator[tuple[str, RandomColony]]:
-    """Yield the names and arguments of the colonies of a group."""
+    """Yield the names and arguments of the colonies of a group, with its rules registered."""
     found = 0
-    for seed in itertools.count(100 * list(GROUPS).index(name)):
-        if found == most:
-            return
-        drawn = _drawn(seed, GROUPS[name])
-        if drawn is None:
-            continue
-        found += 1
-        # Two thirds live longer, so that colonies last.
-        if found % 3 and (drawn.task.life.lifespan or drawn.task.castes):
-            drawn = replace(drawn, task=_living_longer(drawn.task))
-        yield f"{name}-{seed}", drawn
+    with frozen_rules.registered():
+        for seed in itertools.count(100 * list(GROUPS).index(name)):
+            if found == most:
+                return
+            drawn = _drawn(seed, GROUPS[name])
+            if drawn is None:
+                continue
+            found += 1
+            # Two thirds live longer, so that colonies last.
+            if found % 3 and (drawn.task.life.lifespan or drawn.task.castes):
+                drawn = replace(drawn, task=_living_longer(drawn.task))
+            yield f"{name}-{seed}", drawn
 
 
 def _living_longer(task: Task) -> Task:

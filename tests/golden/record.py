@@ -32,7 +32,6 @@ sys.path[:0] = [path for path in PLACES if path not in sys.path]
 os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")  # compiles faster, with equal results
 
 import drawing  # noqa: E402
-import frozen_rules  # noqa: E402
 import numpy as np  # noqa: E402
 from random_colonies import RandomColony, forager  # noqa: E402
 from random_worlds import random_world  # noqa: E402
@@ -262,8 +261,7 @@ def section(name: str, most: int | None = None) -> dict[str, str]:
         found = frames()
     else:
         raise SystemExit(f"there is no section {name!r}; see the head of {Path(__file__).name}.")
-    with frozen_rules.registered():
-        return dict(found)
+    return dict(found)
 
 
 def recorded() -> tuple[int, dict[str, str]]:

@@ -253,7 +253,6 @@ def test_exports_are_files_of_the_project(edited, tmp_path):
 
 WRONG = [
     (None, "an intervention is None"),
-    ({"policy": "random"}, "cannot change the policy"),
     ({"remove_ants": [0]}, "the cell 0 is outside the world"),
     ({"place": {"what": "queen", "cells": [60, 61]}}, "a single cell for the queen"),
     ({"place": {"what": "rock", "cells": [60] * 400_001}}, "at most 400000 are allowed"),

@@ -23,6 +23,7 @@ ARRIVALS = (  # functions that get the value, and whether they are on its way
     *((Run, "of_lone_ant", False), (Store, "read", True)),
     *((paper.table2, "centres_of", False), (paper.table2, "best_of", False)),
 )
+OWN = (f"{ROOT}/taichi_ants/", f"{ROOT}/experiments/")
 # Other launches: to compile a kernel, to evaluate and follow policies, and to train an example.
 ASIDE = {"compiled", "evaluate", "what_policies_do", "trained", "policy_rows"}
 
@@ -34,8 +35,8 @@ def test_settings_pass_at_most_twenty_functions_until_table_2(tmp_path, capsys, 
         real = getattr(owner, name)
 
         def watching(*given, **named):
-            stack = [f for f in traceback.extract_stack() if f.filename.startswith(str(ROOT))]
-            own = [f.name for f in stack if "/tests/" not in f.filename and f.name[0] != "<"]
+            stack = [f for f in traceback.extract_stack() if f.filename.startswith(OWN)]
+            own = [f.name for f in stack if f.name[0] != "<"]
             if not ASIDE & {*own}:
                 passed.update([*own, name] if is_on_way else own)
             return real(*given, **named)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import AntsError, World
-from taichi_ants.learners.policies import FOLLOWED
 from taichi_ants.protocol import EVENTS, ProtocolEvent
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
@@ -30,8 +29,7 @@ def random_protocol(
 ) -> list[ProtocolEvent]:
     """Return random events that are valid by themselves; a world may still not allow them."""
     events: list[ProtocolEvent] = []
-    follows = not learns and task.observation in FOLLOWED
-    kinds = [*KINDS, *(["learning_rate"] if learns else []), *(["policy"] if follows else [])]
+    kinds = [*KINDS, *(["learning_rate"] if learns else [])]
     while len(events) < 4:
         kind = str(rng.choice(list(EVENTS)))
         when: dict[str, Any] = {"tick": int(rng.integers(ticks))}
@@ -96,8 +94,6 @@ def _intervention(
         return {"level": level, "cells": some, "field": str(rng.choice(["trail", *task.fields]))}
     if name == "task":
         return _change(rng, task)
-    if name == "policy":
-        return str(rng.choice(["random", "trail_follower"]))
     return some if name == "clear" else float(rng.random())
 
 

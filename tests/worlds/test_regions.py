@@ -1,4 +1,4 @@
-"""Regions of worlds: their forms, text maps, files, and their names as cells of interventions."""
+"""Regions of worlds: their forms, files, and their names as cells of interventions."""
 
 from __future__ import annotations
 
@@ -8,39 +8,18 @@ import pytest
 
 from taichi_ants import AntsError, At, Colony, Task, World, worlds
 from taichi_ants.task.constants import EMPTY, OBSTACLE
-from taichi_ants.worlds import from_text, to_text
-
-MAP = """; Two regions with a cell in common.
-trail = 9
-region gate = % #
-region gate, left = !
-region left = $ F
-      F
-    .   .
-  .   t   $
-.   %   .   F
-  %   t   .
-.   !   .   .
-  .   t   .
-.   .   #   .
-  .   a   .
-    .   .
-      Q
-"""
+from taichi_ants.worlds import to_text
 
 
-def test_a_text_map_draws_regions():
-    world = from_text(MAP)
-    plain = from_text(
-        MAP.replace("region gate = % #\nregion gate, left = !\nregion left = $ F\n", "")
-        .replace("%", "#").replace("!", ".").replace("$", "F")
-    )  # fmt: skip
-    assert plain == World.from_dict({**world.as_dict(), "regions": {}})
-    assert {name: len(cells) for name, cells in world.regions.items()} == {"gate": 3, "left": 2}
-    again = from_text(to_text(world))
-    assert again == world != plain
-    assert hash(again) == hash(world) == hash(pickle.loads(pickle.dumps(world)))
-    assert World.from_dict(world.as_dict()) == world
+def test_copies_and_files_keep_regions():
+    plain = worlds.paper()
+    world = plain.with_regions({"left": [(3, 0, 0)], "disc": {"centre": (0, 0, 0), "radius": 1}})
+    assert {name: len(cells) for name, cells in world.regions.items()} == {"left": 1, "disc": 7}
+    again = pickle.loads(pickle.dumps(world))
+    assert again == world == World.from_dict(world.as_dict()) != plain
+    assert hash(again) == hash(world)
+    with pytest.raises(AntsError, match="a map cannot show regions"):
+        to_text(world)
 
 
 def test_interventions_take_the_regions_of_each_world(tmp_path):

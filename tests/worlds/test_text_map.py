@@ -61,7 +61,6 @@ def test_settings() -> None:
         (".\n  .", "the map has no queen; draw the queen of each nest once, as Q, R, S, U in this"),
         ("Q\n  .\nQ", "the map has the queens Q Q; draw the queen of each nest once"),
         ("Q\n\nS", "the map has the queens Q S; draw the queen of each nest once"),
-        ("region a = % Q\n%\n\n%", "the map has the queens Q Q; draw"),
         (
             "Q\n  x",
             r"line 2, column 3 of the map has 'x'; use only \. # t, F G H I, Q R S U, 0 to 5",
@@ -75,16 +74,8 @@ def test_settings() -> None:
                 ("trail = 9\ntrail = 9\nQ", 2, "trail = 9"),
                 ("; c\ntrails = 3\nQ", 2, "trails = 3"),
                 ("Q\ntrail = 3", 2, "trail = 3"),
-                ("region = %\nQ", 1, "region = %"),
-                ("region a b = %\nQ", 1, "region a b = %"),
-                ("region a = Q\nQ", 1, "region a = Q"),
-                ("region a = %\nregion b = %\n%", 2, "region b = %"),
-                ("region a = % z\nQ", 1, "region a = % z"),
-                ("Q\nregion a = %", 2, "region a = %"),
-                ("region 1a = %\n%\n\nQ", 1, "region 1a = %"),
             )
         ),
-        ("region a = %\nQ", "regions.a is empty; give at least one cell"),
         ("Q" + " " * 200_003 + "." + "\n" * 200_000 + ".", "ranges"),
     ],
 )
@@ -149,12 +140,6 @@ def drawable_worlds(draw: st.DrawFn) -> World:
         obstacles=are("#"),
         trails=[(cell, level) for cell in are("ta")],
         ants=[(cell, draw(st.integers(0, 5))) for cell in are("0a")],
-        regions=draw(
-            st.dictionaries(
-                st.sampled_from(["a", "region", "of_2"]),
-                st.lists(st.sampled_from(cells), min_size=1),
-            )
-        ),
     )
 
 
@@ -165,7 +150,7 @@ def test_reading_undoes_drawing(world: World) -> None:
     assert to_text(again) == drawn
     assert sorted(again.ants.tolist()) == sorted(world.ants.tolist())
     contents = (world.foods, world.obstacles, world.trails)
-    assert again == World(world.ranges, world.queen, *contents, again.ants, regions=world.regions)
+    assert again == World(world.ranges, world.queen, *contents, again.ants)
 
 
 @given(axial_cells)

@@ -26,14 +26,9 @@ def test_every_registered_world_can_be_used(name: str) -> None:
 
 
 def test_a_builder_builds_worlds() -> None:
-    with pytest.raises(AntsError, match="must be a function of a seed"):
-        worlds.register("tiny", worlds.paper())
     worlds.register("empty", lambda seed: None)
     with pytest.raises(AntsError, match="builder of 'empty' is None; it must be a World"):
         worlds.build("empty")
-    worlds.register("broken", lambda seed: seed // 0)
-    with pytest.raises(AntsError, match=r"'broken' failed with ZeroDivisionError: .*; correct it"):
-        worlds.build("broken")
 
 
 @pytest.mark.parametrize("name", ["papr", None, "x" * 5000, "a\0b"])

@@ -31,21 +31,19 @@ from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, NestRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
-from taichi_ants.engines.layout import note_best_actions
-from taichi_ants.errors import AntsError, count, entries_of, shown
+from taichi_ants.errors import AntsError, count, entries_of, refuse
 from taichi_ants.grid.constants import (
     N_HEADINGS,
     STREAM_BORN,
     STREAM_INTERVENTION,
-    STREAM_START_CELL,
 )
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.interventions import Intervention, flat_indices
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.task.field import TRAIL
-from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import World, free_cells
 
 Change = Iterator[None]  # yields once, between its checks and its effects
 REACH = 8  # cells; twice the radius of the largest brush on the live page
@@ -117,8 +115,8 @@ class _World:
         if change.cells is None:
             return self._add_some(self._amount(change), change.heading, change.nest)
         cells = self._index(change.cells)
-        distances = [self.colony.grid.distances(queen)[cells] for queen in self._queens()]
-        nests = np.argmin(distances, axis=0)
+        grid, queens = self.colony.grid, self.colony.grid.cells(self.queen_cells).tolist()
+        nests = np.argmin([grid.distances(tuple(queen))[cells] for queen in queens], axis=0)
         if change.nest is not None:
             nests = np.full(len(cells), change.nest)
         return self._add(cells, nests, change.heading)
@@ -132,7 +130,7 @@ class _World:
             words = self.all.stream(self.w).bits(len(slots))
             self._remove(slots[np.argsort(words, kind="stable")[: self._amount(change)]])
         else:
-            self._remove(slots[np.isin(self.cells[slots], cells)])
+            self._remove(slots[np.isin(self.view("cell")[slots], cells)])
 
     def ants(self, change: language.SetAnts) -> Change:
         """Set the number of ants; new ants take free cells in the order of `World.start`."""
@@ -160,7 +158,7 @@ class _World:
         """
         held = self.view("ground")[there]
         ants, to = self._aside(there) if what != EMPTY else (there[:0], there[:0])
-        at = self.cells[ants]
+        at = self.view("cell")[ants]
         there = there[((held >> 4 == 0) | np.isin(there, at)) & (held != QUEEN)]  # see `layout`
         yield from self._start_with(there, what | kind << _NUMBER)
         self._step_aside(ants, to)
@@ -193,19 +191,16 @@ class _World:
         AntsError if there is too little room.
         """
         colony, grid = self.colony, self.colony.grid
-        free = np.flatnonzero((self.view("ground") == EMPTY) & grid.exists)
-        if n > len(free):
+        free = (self.view("ground") == EMPTY) & grid.exists
+        if n > (room := int(np.count_nonzero(free))):
             raise AntsError(
-                f"{count(n, 'ant')} cannot join, because there are {count(len(free), 'free cell')};"
-                " add fewer ants."
+                f"{count(n, 'ant')} cannot join, because there are {count(room, 'free cell')}; add "
+                "fewer ants."
             )
-        words = stream_state(colony.seeds[self.w], STREAM_START_CELL, grid.number(grid.cells(free)))
-        queens, near = self._queens(), colony.start == "nest"
-        wanted = range(len(queens)) if nest is None else [nest]
-        orders = [
-            free[np.lexsort((words, grid.distances(queens[nest])[free] * near))] for nest in wanted
-        ]
-        return self._add(_in_turn(orders, n), np.resize(wanted, n), heading)
+        nests = np.resize(range(colony.n_nests) if nest is None else [nest], n)
+        queens = grid.cells(self.queen_cells)
+        cells = free_cells(grid, free, queens, nests, colony.seeds[self.w], colony.start)
+        return self._add(cells, nests, heading)
 
     def _index(self, cells: Sequence[Any] | str) -> np.ndarray:
         """Return the flat indices of cells, or of those of a region, without duplicates."""
@@ -216,11 +211,6 @@ class _World:
     def view(self, name: str) -> np.ndarray:
         """Return a view of the world's part of an array."""
         return self.colony.part(name, self.w)
-
-    @property
-    def cells(self) -> np.ndarray:
-        """The cell of each slot."""
-        return self.view("cell")
 
     @property
     def queen_cells(self) -> np.ndarray:
@@ -241,10 +231,6 @@ class _World:
         if change.share is None:
             return change.number or 0
         return int(change.share * len(self._living_slots(change.nest)) + 0.5)
-
-    def _queens(self) -> list[Any]:
-        """Return the cell of each nest's queen."""
-        return [tuple(cell) for cell in self.colony.grid.cells(self.queen_cells).tolist()]
 
     def _start_with(self, cells: Any, contents: Any) -> Change:
         """Let later episodes begin with these contents of cells, see `_start_of`.
@@ -292,8 +278,8 @@ class _World:
         free = (self.view("ground") == EMPTY) & grid.exists
         free[cells] = False
         living = np.flatnonzero(self.colony.living[self.w])
-        slots = living[np.isin(self.cells[living], cells)]
-        row, column = np.divmod(self.cells[slots], grid.width)
+        slots = living[np.isin(self.view("cell")[living], cells)]
+        row, column = np.divmod(self.view("cell")[slots], grid.width)
         to = np.full(len(slots), -1)
         for q, r in _STEPS.tolist():
             waiting = np.flatnonzero(to < 0)
@@ -309,15 +295,14 @@ class _World:
 
     def _step_aside(self, ants: np.ndarray, to: np.ndarray) -> None:
         """Move the ants in some slots to other cells."""
-        ground, at = self.view("ground"), self.cells[ants]
-        self.cells[ants] = to
+        ground, at = self.view("ground"), self.view("cell")[ants]
+        self.view("cell")[ants] = to
         ground[to] = ground[at]
         ground[at] = EMPTY
 
     def _can_be_free(self, cell: int) -> bool:
         """Return whether a cell is empty, except for an ant that can move aside."""
-        slots, _ = self._aside(np.array([cell]))
-        return bool(self.view("ground")[cell] == EMPTY) or len(slots) > 0
+        return self.view("ground")[cell] == EMPTY or len(self._aside(np.array([cell]))[0]) > 0
 
     def _lay(self, cells: np.ndarray, level: int, number: int) -> None:
         """Set the levels of a pheromone in cells; 0 is the trail."""
@@ -368,7 +353,7 @@ class _World:
         numbers = self.view("number")[slots]
         first = numbers < colony.ants  # their streams continue in the next episode
         self.view("first_streams")[numbers[first]] = self.view("streams")[slots[first]]
-        self.view("ground")[self.cells[slots]] = EMPTY
+        self.view("ground")[self.view("cell")[slots]] = EMPTY
         self.view("stage")[slots] = Stage.VACANT
         colony.close_gaps()
         self._count_ants()
@@ -421,10 +406,8 @@ class Interventions:
         n = len(colony.worlds)
         numbers = range(n) if worlds is None else entries_of(worlds)
         if not numbers or not all(isinstance(w, (int, np.integer)) and 0 <= w < n for w in numbers):
-            raise AntsError(
-                f"worlds is {shown(worlds)}; it must be a list of one or more numbers from 0 to "
-                f"{n - 1}, or None for all worlds."
-            )
+            allowed = f"a list of one or more numbers from 0 to {n - 1}, or None for all worlds"
+            refuse("worlds", worlds, allowed)
         self.worlds = tuple(dict.fromkeys(map(int, numbers)))
         self._first = colony.worlds
         self.starts = [_start_of(world) for world in colony.worlds] if lasting else []
@@ -441,12 +424,14 @@ class Interventions:
             AntsError: A world does not allow the change; nothing has changed in any world.
         """
         colony = self.colony
-        learns = colony.learns
-        if isinstance(change, language.SetPolicy):  # ants that are given actions follow none either
-            learns |= colony.is_given_actions
-        change.check_in(colony.worlds[self.worlds[0]], colony.task, learns)
-        if change.in_all_worlds or (self.lasting and isinstance(change, language.SetAnts)):
-            self._check_all(change)
+        change.check_in(colony.worlds[self.worlds[0]], colony.task, colony.learns)
+        sets_start = self.lasting and isinstance(change, language.SetAnts)
+        running = np.flatnonzero(colony.running).tolist() if colony.episode >= 0 else []
+        if (change.in_all_worlds or sets_start) and not set(running) <= set(self.worlds):
+            raise AntsError(
+                f"the worlds of a colony share what `{change.path}` changes, so it cannot change "
+                "in some of them; change all worlds, or make a colony with a single seed."
+            )
         match change:
             case language.Episode():
                 self.begin_episode()
@@ -460,22 +445,8 @@ class Interventions:
                     colony.training, learning_rate_decay=1.0, min_learning_rate=0.0
                 )
                 colony.set_learning_rate(change.value)
-            case language.SetPolicy():
-                table = change.table_for(colony.task)
-                for w in self.worlds:
-                    q = colony.part("q", w)
-                    q.reshape(-1, len(table), ROW)[..., :N_ACTIONS] = table
-                    note_best_actions(q)
             case _:
                 self._change(change)
-
-    def _check_all(self, change: Intervention) -> None:
-        running = np.flatnonzero(self.colony.running).tolist()
-        if self.colony.episode >= 0 and not set(running) <= set(self.worlds):
-            raise AntsError(
-                f"the worlds of a colony share what `{change.path}` changes, so it cannot change "
-                "in some of them; change all worlds, or make a colony with a single seed."
-            )
 
     def _change(self, change: Intervention) -> None:
         """Make a change in all worlds, after its checks in all; then their ants observe again."""
@@ -496,17 +467,16 @@ class Interventions:
     def set_task(self, task: Task) -> None:
         """Set a task that differs only in settings that kernels read as numbers."""
         colony = self.colony
-        levels = [
-            (world, number, np.maximum(colony.stored_pheromone(world, number) - clock, 0))
+        clocks = {
+            (world, number): colony.trail_clock(world, number)
             for world in range(len(colony.worlds))
             for number, pheromone in enumerate(colony.pheromones)
             if not pheromone.dense
-            for clock in [colony.trail_clock(world, number)]
-        ]
+        }
         colony.set_task(task)
-        for world, number, level in levels:
-            clock = colony.trail_clock(world, number)
-            colony.stored_pheromone(world, number)[:] = np.where(level > 0, level + clock, 0)
+        for which, clock in clocks.items():
+            stored = colony.stored_pheromone(*which)
+            stored[:] = np.where(stored > clock, stored - clock + colony.trail_clock(*which), 0)
 
     def state(self) -> str:
         """Return a hash of the whole state; colonies with equal hashes behave identically."""
@@ -562,14 +532,3 @@ def _start_of(world: World) -> np.ndarray:
     start = world.ground()
     start[world.grid.index(world.queens)] |= (np.arange(world.n_nests) << _NUMBER).astype(np.uint8)
     return start | world.kinds_by_cell() << _NUMBER
-
-
-def _in_turn(orders: Sequence[np.ndarray], n: int) -> np.ndarray:
-    """Return the first n cells, of which each order in turn takes its first that is not taken."""
-    if len(orders) == 1:
-        return orders[0][:n]
-    taken: dict[int, None] = {}
-    turns = [(cell for cell in order.tolist() if cell not in taken) for order in orders]
-    for k in range(n):
-        taken[next(turns[k % len(turns)])] = None
-    return np.fromiter(taken, np.int64, n)

@@ -17,8 +17,8 @@ from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
 class Timetable:
     """The events of a protocol in the episodes of a `Colony`, which imports this module.
 
-    A context manager for an episode that has begun. At its end, the numbers and tables of the
-    colony are again those of its beginning; `ColonyState.lay_out` resets the worlds.
+    A context manager for an episode that has begun. At its end, the numbers of the colony are
+    again those of its beginning; `ColonyState.lay_out` resets the worlds.
 
     Raises:
         AntsError: An event cannot happen in an episode of `length` ticks, or in this colony.
@@ -53,8 +53,6 @@ class Timetable:
         self._interventions = Interventions(colony, lasting=False)
         self._done: dict[int, np.ndarray] = {}  # by event: the worlds in which it has happened
         self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
-        replaces = any(event.policy for event in self._events)
-        self._q = colony.arrays["q"].copy() if replaces else None
 
     def __exit__(self, *_: object) -> None:
         if not self._events:
@@ -65,8 +63,6 @@ class Timetable:
         colony.training, colony.epsilon = training, epsilon
         if colony.learning_rate != learning_rate:
             colony.set_learning_rate(learning_rate)
-        if self._q is not None:
-            colony.arrays["q"][:] = self._q
 
     def pieces(self, stepper: Stepper, n: int) -> Iterator[None]:
         """Yield after each short launch until n ticks are done, with all events on the way."""
