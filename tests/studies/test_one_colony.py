@@ -14,7 +14,7 @@ from taichi_ants import AntsError, Colony, Task, TrainingConfig, worlds
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.rendering import writers
 from taichi_ants.studies.interruption import held, stoppable
-from taichi_ants.studies.one_colony import Span, Totals, check_places, draw, live, spans, summary
+from taichi_ants.studies.one_colony import live, summary
 
 TASK = Task(delivery="truncates", evaporation_in_training=True)
 TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
@@ -50,12 +50,6 @@ def test_a_colony_is_saved_although_its_picture_cannot_be(
     assert saved.ticks == ticks
     np.testing.assert_array_equal(saved.cells, other.cells)
     np.testing.assert_array_equal(saved.q_values, other.q_values)
-
-
-def test_the_numbers_of_a_figure_need_a_place_too(tmp_path) -> None:
-    (tmp_path / "a.csv").mkdir()
-    with pytest.raises(AntsError, match=r"a\.csv' is not a regular file"):
-        check_places(None, None, str(tmp_path / "a.png"))
 
 
 def test_a_stopped_colony_ends_at_a_whole_tick_with_all_its_files(tmp_path, capsys) -> None:
