@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, Any
 from taichi_ants.settings import flat
 from taichi_ants.studies.command_line import (
     PLUGIN,
-    THREADS,
     Parser,
+    add_threads,
     progress_bar,
     whole_number,
 )
@@ -78,7 +78,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--no-browser", action="store_true", help=closed)
     add("--duration", type=whole_number(1), metavar="N", help="end after N seconds")
     add("--plugin", metavar="FILE", help=PLUGIN)
-    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
+    add_threads(parser)
     settings = parser.parse_args(arguments)
     if (settings.folder is None) != (settings.row is None):
         parser.error("FOLDER and --row belong together, so give both or neither")
