@@ -89,21 +89,3 @@ def test_the_summary_counts_in_words() -> None:
     assert one.endswith(" % of the moves blocked, 1 birth.")
     assert "\n2 deliveries by tick 1, " in two
     assert two.endswith(" % of the moves blocked, 2 births, 1 death.")
-
-
-TOTALS = [Totals(5, 10, 100, 50), Totals(7, 14, 300, 100), Totals(8, 14, 300, 100)]
-ROWS = [Span(5, 7, 2.0, 0.25), Span(7, 8, 0.0, 0.0)]
-
-
-def test_rates_are_means_over_spans_even_where_nobody_moves() -> None:
-    assert spans(TOTALS) == ROWS
-    assert spans(TOTALS[:1]) == []
-
-
-def test_the_figure_shows_its_rows() -> None:
-    upper, lower = draw(ROWS, "3 ants").axes
-    for axis, expected in ((upper, [2.0, 0.0]), (lower, [25.0, 0.0])):
-        steps = axis.patches[-1].get_data()
-        assert steps.values.tolist() == expected
-        assert np.array_equal(steps.edges, [5, 7, 8])
-    assert lower.get_xlim() == (5, 8)
