@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from gymnasium.error import InvalidAction
 
-from taichi_ants.errors import as_array, checked_whole, shown
+from taichi_ants.errors import checked_whole, shown
 from taichi_ants.grid.randomness import GAMMA, mix
 from taichi_ants.learners.policies import checked_table, frozen_policy
 from taichi_ants.task import Task
@@ -56,11 +56,6 @@ class Rollout(NamedTuple):
             events=np.empty(shape, np.uint8),
             final_observations=np.empty((0, *seen), formats.table.dtype),
         )
-
-    def check_like(self, other: Rollout) -> None:
-        """Raise AntsError unless the arrays of this `out` have the shapes and types of another."""
-        for name, mine, wanted in zip(self._fields[:-1], self, other, strict=False):
-            as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
 
 
 class TablePolicy(NamedTuple):

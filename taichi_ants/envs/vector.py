@@ -18,15 +18,7 @@ from gymnasium.vector.utils import batch_space
 from taichi_ants.arguments import check_ranges, checked_max_steps, checked_share, checked_world
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.envs.rollout import Rollout, TablePolicy, checked_actions, checked_plan
-from taichi_ants.errors import (
-    AntsError,
-    as_array,
-    check_one_of,
-    checked_whole,
-    expect,
-    shown,
-    whole,
-)
+from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole, shown, whole
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.task import Task
@@ -316,7 +308,6 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         *,
         epsilon: float = 0.0,
         seed: int | None = None,
-        out: Rollout | None = None,
     ) -> Rollout:
         """Return the results of several steps, with given actions or by a policy.
 
@@ -332,8 +323,6 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
             epsilon: The probability with which an ant that follows a policy acts at random.
             seed: The seed of the policy's random numbers, which also break ties. None draws one
                 from `np_random`, which `reset(seed=...)` seeds.
-            out: An earlier rollout of the same size. This call overwrites its arrays, instead of
-                creating new ones.
 
         Raises:
             ResetNeeded: No episode has begun, or autoreset_mode is "Disabled" and one has ended.
@@ -344,10 +333,6 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         length, actions, q_values = checked_plan(policy, steps, n, ants.task)
         epsilon, choices = checked_share("epsilon", epsilon), None
         into = Rollout.empty(length, n, ants.shown)
-        if out is not None:
-            expect("out", out, Rollout)
-            out.check_like(into)
-            into = out
         if actions is not None:
             into = into._replace(actions=actions)
         if q_values is not None:
@@ -372,7 +357,7 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         return infos | {f"_{name}": have.copy() for name in facts}
 
     def render(self) -> tuple[Any, ...] | None:
-        """Return the world of each environment, as a picture or a text map, or None.
+        """Return the world of each environment, as a picture, or None.
 
         Ants that share a world also share its picture.
         """
