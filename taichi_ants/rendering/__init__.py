@@ -12,13 +12,12 @@ from taichi_ants.rendering.snapshots import Episode, at_start, colony_snapshots,
 from taichi_ants.rendering.writers import (
     PAUSE,
     check_animation,
-    check_picture,
     save_animation,
     save_picture,
 )
 
 __all__ = [
     "PAUSE", "Episode", "Scene", "Snapshot", "Status", "at_start", "check_animation",
-    "check_picture", "colony_snapshots", "frames", "picture", "save_animation", "save_picture",
+    "colony_snapshots", "frames", "picture", "save_animation", "save_picture",
 ]  # fmt: skip
 __dir__ = __all__.copy  # completion lists only public names

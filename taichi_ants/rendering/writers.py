@@ -54,11 +54,6 @@ def is_picture(path: files.PathLike) -> bool:
     return Path(path).suffix.lower() == ".png"
 
 
-def check_picture(path: files.PathLike) -> Path:
-    """Return the path of a picture after checking it; raises as `save_picture` does."""
-    return check_file(path, "one picture", ".png")
-
-
 def check_file(path: files.PathLike, holds: str, *endings: str) -> Path:
     """Return a path after checking its extension and that it is writable; AntsError if not."""
     target = files.check_writable_file(path)
@@ -102,7 +97,7 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     Raises:
         AntsError: The file does not end in .png, or is not writable.
     """
-    save_animation(check_picture(path), [frame])
+    save_animation(check_file(path, "one picture", ".png"), [frame])
 
 
 def write(target: Path, content: bytes) -> None:
