@@ -130,27 +130,23 @@ class LoneAnts(Ants):
 class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
     """An ant on a hexagonal grid that searches for food and carries it to its queen.
 
-    The rules are those of "Ants and Reinforcement Learning Algorithms". See
-    `docs/environments_reference.md`.
+    The rules are those of "Ants and Reinforcement Learning Algorithms"; see
+    `docs/environments_reference.md`, also for what codes in observations mean.
 
-    ## Observation Space
+    ## Spaces
     Observations have k parts of sizes p1, ..., pk, which depend on the task. The paper's have the
-    sizes (2, 4, 4, 4): the load, then a code for each of the cells left, forward and right. Codes
-    are 0 (empty), 1 (obstacle), 2 (trail) and 3 (food) for an ant without food. For an ant with
-    food, 2 is a cell nearer to the queen, and 3 is the queen.
+    sizes (2, 4, 4, 4): the load, then a code for each of the cells left, forward and right.
 
     - "cells": `MultiDiscrete([p1, ..., pk])`, int64 (k,).
     - "index": `Discrete(p1 * ... * pk)`, the state index.
     - "one_hot": `Box(0, 1, (p1 + ... + pk,), float32)`, each part one-hot.
 
-    ## Action Space
-    `Discrete(5)`. 0, 1 and 2 turn the ant to the cell left, forward or right and enter it. 3 picks
-    up food in view, and 4 gives the food to the queen in view. A blocked move still turns the ant.
+    Actions are `Discrete(5)`: 0, 1 and 2 turn the ant to the cell left, forward or right and enter
+    it, 3 picks up food in view, and 4 gives it to the queen in view. A blocked move still turns.
 
     ## Info
     - `state`: int64, the state index.
-    - `action_mask`: int8 (5,), 1 for actions that can succeed; in a dead end, 1 for the moves,
-      which turn the ant. `action_masks()` returns it as bool, for MaskablePPO of sb3-contrib.
+    - `action_mask`: int8 (5,), 1 for actions that can succeed; in a dead end, for the moves.
     - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset`.
     - `reason`: int64, the reason why the action failed, a `taichi_ants.envs.Reason`, or NONE.
     - `deliveries`: int64, the deliveries of this episode. Report them beside the return, because
@@ -230,7 +226,7 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
         }
 
     def action_masks(self) -> np.ndarray:
-        """Return the actions that can succeed now, bool (5,): `info["action_mask"]` as bool."""
+        """Return `info["action_mask"]` as bool (5,), for MaskablePPO of sb3-contrib."""
         self._check_begun("action_masks()")
         return ACTION_MASKS[self._arrays["paper_states"][0]].astype(bool)
 
