@@ -9,12 +9,7 @@
 from taichi_ants.records import Snapshot
 from taichi_ants.rendering.scene import Scene, Status
 from taichi_ants.rendering.snapshots import Episode, at_start, colony_snapshots, frames, picture
-from taichi_ants.rendering.writers import (
-    PAUSE,
-    check_animation,
-    save_animation,
-    save_picture,
-)
+from taichi_ants.rendering.writers import PAUSE, check_animation, save_animation, save_picture
 
 __all__ = [
     "PAUSE", "Episode", "Scene", "Snapshot", "Status", "at_start", "check_animation",

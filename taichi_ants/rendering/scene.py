@@ -248,15 +248,11 @@ def _draw_status(
         room = width - text.width(label + "  ", size)
         text.write(frame, value, left + width, y, size, align="right", room=room)
         y += round(1.45 * size)
-    if status.q_values is not None:
-        y += round(0.3 * size)
-        text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
-        _draw_bars(frame, status, y + round(0.5 * size), left, width, size)
-
-
-def _draw_bars(
-    frame: np.ndarray, status: Status, top: int, left: int, width: int, size: int
-) -> None:
+    if status.q_values is None:
+        return
+    y += round(0.3 * size)
+    text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
+    top = y + round(0.5 * size)
     start = left + max(text.width(name, size) for name in ACTION_NAMES) + 0.6 * size
     end = left + width - text.width("-00.00", size) - 0.3 * size
     low, high = status.q_range

@@ -88,7 +88,11 @@ def save_animation(
         *_, last = checked
         write(target, png(last, optimize=True))
     else:
-        write(target, _gif(checked, fps))
+        # The GIF repeats forever; Pillow merges equal frames and stores only changes.
+        buffer, images = io.BytesIO(), _with_palette(checked, fps)
+        changes = {"optimize": True, "transparency": _UNCHANGED, "disposal": 1}
+        next(images).save(buffer, "GIF", save_all=True, append_images=images, loop=0, **changes)
+        write(target, buffer.getvalue())
 
 
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
@@ -130,14 +134,6 @@ def png(frame: np.ndarray, optimize: bool = False) -> bytes:
 
     buffer = io.BytesIO()
     Image.fromarray(frame).save(buffer, "PNG", optimize=optimize)
-    return buffer.getvalue()
-
-
-def _gif(frames: Iterable[np.ndarray], fps: float) -> bytes:
-    """Return a GIF that repeats forever; Pillow merges equal frames and stores only changes."""
-    buffer, images = io.BytesIO(), _with_palette(frames, fps)
-    changes = {"optimize": True, "transparency": _UNCHANGED, "disposal": 1}
-    next(images).save(buffer, "GIF", save_all=True, append_images=images, loop=0, **changes)
     return buffer.getvalue()
 
 
