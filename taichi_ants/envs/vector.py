@@ -144,17 +144,14 @@ def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World,
         )
     if len(entries) > most:
         raise AntsError(f"world lists {len(entries)} worlds; it must list at most {most}.")
-    checked = tuple(
-        checked_world(_world_of(entry), what="the environment", supports=supports)
-        for entry in entries
-    )
-    check_ranges(checked)
-    return checked
-
-
-def _world_of(world: Any) -> Any:
-    text = isinstance(world, str) and "\n" in world
-    return world if isinstance(world, World) else from_text(world) if text else build(world)
+    built = []
+    for entry in entries:
+        if not isinstance(entry, World):
+            is_map = isinstance(entry, str) and "\n" in entry
+            entry = from_text(entry) if is_map else build(entry)
+        built.append(checked_world(entry, what="the environment", supports=supports))
+    check_ranges(built)
+    return tuple(built)
 
 
 def task_of(task: Rules | None) -> Task:
@@ -332,9 +329,14 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         waiting, ants, n = self._waiting("rollout"), self._ants, self.num_envs
         length, actions, q_values = checked_plan(policy, steps, n, ants.task)
         epsilon, choices = checked_share("epsilon", epsilon), None
-        into = Rollout.empty(length, n, ants.shown)
-        if actions is not None:
-            into = into._replace(actions=actions)
+        shape, table = (length, n), ants.shown.table
+        into = Rollout(
+            np.empty((length + 1, n, *table.shape[1:]), table.dtype),
+            np.empty(shape, np.int64) if actions is None else actions,
+            *(np.empty(shape), np.empty(shape, bool), np.empty(shape, bool)),
+            events=np.empty(shape, np.uint8),
+            final_observations=table[:0],
+        )
         if q_values is not None:
             drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
             streams = stream_state(drawn, STREAM_ROLLOUT, np.arange(n))

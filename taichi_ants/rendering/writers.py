@@ -138,7 +138,10 @@ def png(frame: np.ndarray, optimize: bool = False) -> bytes:
 
 
 def _with_palette(frames: Iterable[np.ndarray], fps: float) -> Iterator[Image]:
-    """Yield frames in the nearest colours of the first frame's palette, with their durations."""
+    """Yield frames in the nearest colours of a palette, with their durations.
+
+    The palette has the colours of scenes and of the first frame.
+    """
     from PIL import Image
 
     nearest = np.full(1 << 24, -1, np.int16)  # the index of each colour in the palette, once known
@@ -146,7 +149,10 @@ def _with_palette(frames: Iterable[np.ndarray], fps: float) -> Iterator[Image]:
     told, still = 0, 0  # milliseconds so far, and of the present picture
     for number, frame in enumerate(frames, start=1):
         if number == 1:
-            palette, before = _palette(frame), ~frame
+            kept, sample = map(colours.channels, (_KEPT, np.unique(colours.packed(frame))))
+            free = Image.fromarray(sample[None]).quantize(_UNCHANGED - len(kept)).getpalette()
+            more = np.array(free, dtype=np.uint8).reshape(-1, 3)
+            palette, before = np.concatenate([kept, more])[:_UNCHANGED], ~frame
             indices = np.zeros(frame.shape[:2], np.uint8)
         # Most pixels stay, so only rows that change are converted.
         rows = np.flatnonzero((frame != before).any(axis=(1, 2)))
@@ -165,12 +171,3 @@ def _with_palette(frames: Iterable[np.ndarray], fps: float) -> Iterator[Image]:
         image.info["duration"] = until - told if still <= _LONGEST else 0
         yield image
         before, indices, told = frame.copy(), shown, until
-
-
-def _palette(first: np.ndarray) -> np.ndarray:
-    """Return a palette for all frames, uint8 (n, 3): the colours of scenes and the first frame."""
-    from PIL import Image
-
-    kept, sample = map(colours.channels, (_KEPT, np.unique(colours.packed(first))))
-    free = Image.fromarray(sample[None]).quantize(_UNCHANGED - len(kept)).getpalette()
-    return np.concatenate([kept, np.array(free, dtype=np.uint8).reshape(-1, 3)])[:_UNCHANGED]
