@@ -48,8 +48,7 @@ def vector(num_envs: int) -> dict[str, Callable[[], int]]:
     env.reset(seed=0)
     length = max(1, min(_MOST_LENGTH, _STEPS_OF_ROLLOUT // num_envs))
     actions = np.random.default_rng(0).integers(0, 5, (length, num_envs))
-    env.rollout(actions)  # compiles kernels
-    env.rollout("random", length)
+    given, drawn = env.rollout(actions), env.rollout("random", length)  # compiles kernels
     rollouts = max(1, _STEPS // (length * num_envs))
 
     def step() -> int:
@@ -59,12 +58,12 @@ def vector(num_envs: int) -> dict[str, Callable[[], int]]:
 
     def rollout() -> int:
         for _ in range(rollouts):
-            env.rollout(actions)
+            env.rollout(actions, out=given)
         return rollouts * length * num_envs
 
     def policy() -> int:
         for _ in range(rollouts):
-            env.rollout("random", length, epsilon=1.0)
+            env.rollout("random", length, epsilon=1.0, out=drawn)
         return rollouts * length * num_envs
 
     return {f"{num_envs} {one.__name__}": one for one in (step, rollout, policy)}

@@ -18,7 +18,15 @@ from gymnasium.vector.utils import batch_space
 from taichi_ants.arguments import check_ranges, checked_max_steps, checked_share, checked_world
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.envs.rollout import Rollout, TablePolicy, checked_actions, checked_plan
-from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole, shown, whole
+from taichi_ants.errors import (
+    AntsError,
+    as_array,
+    check_one_of,
+    checked_whole,
+    expect,
+    shown,
+    whole,
+)
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.task import Task
@@ -305,6 +313,7 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         *,
         epsilon: float = 0.0,
         seed: int | None = None,
+        out: Rollout | None = None,
     ) -> Rollout:
         """Return the results of several steps, with given actions or by a policy.
 
@@ -320,6 +329,8 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
             epsilon: The probability with which an ant that follows a policy acts at random.
             seed: The seed of the policy's random numbers, which also break ties. None draws one
                 from `np_random`, which `reset(seed=...)` seeds.
+            out: An earlier rollout of the same size. This call overwrites its arrays, instead of
+                creating new ones.
 
         Raises:
             ResetNeeded: No episode has begun, or autoreset_mode is "Disabled" and one has ended.
@@ -332,11 +343,18 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         shape, table = (length, n), ants.shown.table
         into = Rollout(
             np.empty((length + 1, n, *table.shape[1:]), table.dtype),
-            np.empty(shape, np.int64) if actions is None else actions,
+            np.empty(shape, np.int64),
             *(np.empty(shape), np.empty(shape, bool), np.empty(shape, bool)),
             events=np.empty(shape, np.uint8),
             final_observations=table[:0],
         )
+        if out is not None:
+            expect("out", out, Rollout)
+            for name, mine, wanted in zip(into._fields[:-1], out, into, strict=False):
+                as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
+            into = out
+        if actions is not None:
+            into = into._replace(actions=actions)
         if q_values is not None:
             drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
             streams = stream_state(drawn, STREAM_ROLLOUT, np.arange(n))

@@ -188,13 +188,26 @@ def test_forms_of_a_policy(tmp_path):
 
 
 @pytest.mark.parametrize("make", [lone, colony])
+def test_out_is_overwritten(make):
+    env, other = make(), make()
+    for one in (env, other):
+        one.reset(seed=2)
+    first = env.rollout("random", 20)
+    other.rollout("random", 20)
+    again, fresh = env.rollout("random", 20, out=first), other.rollout("random", 20)
+    for mine, its, old in zip(again[:-1], fresh[:-1], first[:-1], strict=True):
+        assert mine is old
+        assert np.array_equal(mine, its)
+
+
+@pytest.mark.parametrize("make", [lone, colony])
 def test_refuses(make, tmp_path):
     env = make()
     with pytest.raises(ResetNeeded, match=r"^no episode has begun; call reset\(\) before rollout"):
         env.rollout("random", 3)
     env.reset(seed=1)
     n, n_states = env.num_envs, env._ants.task.n_states
-    env.rollout("random", 3)
+    before = env.rollout("random", 3)
     where = env._ants.states().copy()
     for error, message, policy, options in (
         (InvalidAction, rf"of shape \(1, {n}\)", np.zeros((0, n), int), {}),
@@ -213,6 +226,8 @@ def test_refuses(make, tmp_path):
         (AntsError, r"^steps is 2.5; ", "random", {"steps": 2.5}),
         (AntsError, r"^epsilon is 2; ", "random", {"steps": 3, "epsilon": 2}),
         (AntsError, r"^seed is 'a'; ", "random", {"steps": 3, "seed": "a"}),
+        (AntsError, r"^out is 3; it must be a Rollout", "random", {"steps": 3, "out": 3}),
+        (AntsError, r"^out.observations is .*\(5, ", "random", {"steps": 4, "out": before}),
     ):
         with pytest.raises(error, match=message):
             env.rollout(policy, **options)
