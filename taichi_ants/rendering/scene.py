@@ -135,6 +135,8 @@ class Scene:
             room -= _PANEL_WIDTH * letters + margin
             self._panel = room, width - margin - room, letters
         self._width, self._margin = width, margin
+        self._legend: tuple[list[_Entry], str, np.ndarray, np.ndarray]
+        self._legend = [], "", np.zeros(0), np.zeros(0)
         beyond = view and overlay
         self._rasteriser = Rasteriser(grid, room, self._height, margin, beyond, scales)
 
@@ -161,15 +163,31 @@ class Scene:
         if status is not None:
             top = self._margin + round(_TITLE_HEIGHT * size) * bool(self._title)
             _draw_status(frame, status, top, *self._panel)
-        self._draw_legend(frame, snapshot, *self._panel)
+        self._add_legend(frame, snapshot)
         return frame
 
+    def _add_legend(self, frame: np.ndarray, snapshot: Snapshot) -> None:
+        """Draw the legend: its pixels of the last frame, unless a scale or an entry has changed."""
+        assert self._panel is not None
+        entries = [*self._further_entries(snapshot), *_LEGEND]
+        most = f"{self._rasteriser.darkest(TRAIL, snapshot.trail)} and more"
+        empty = colours.channels(colours.PAGE)
+        if self._legend[:2] != (entries, most):
+            page = np.full(frame.shape, empty)
+            self._draw_legend(page, entries, most, *self._panel)
+            where = (page != empty).any(axis=2)
+            self._legend = entries, most, page[where], where
+        *_, pixels, where = self._legend
+        if (frame[where] == empty).all():
+            frame[where] = pixels
+        else:  # in a small picture, it covers a part of the status
+            self._draw_legend(frame, entries, most, *self._panel)
+
     def _draw_legend(
-        self, frame: np.ndarray, snapshot: Snapshot, left: int, width: int, size: int
+        self, frame: np.ndarray, entries: list[_Entry], most: str, left: int, width: int, size: int
     ) -> None:
         """Draw the legend, which grows upwards with its entries."""
         cue = self._task.homing_cue if self._task else COMPASS
-        entries = [*self._further_entries(snapshot), *_LEGEND]
         if cue != COMPASS:
             label = "trail (S)" if cue == TRAIL else f"field {cue} (S)"
             entries = [entry._replace(label=label) if entry.letter else entry for entry in entries]
@@ -198,7 +216,6 @@ class Scene:
         ramp = colours.channels(colours.TRAIL_RAMP[columns])
         frame[y : y + round(0.7 * size), left : left + width] = ramp
         y += round(1.75 * size)
-        most = f"{self._rasteriser.darkest(TRAIL, snapshot.trail)} and more"
         text.write(frame, "1", left, y, size, colours.FAINT_INK)
         text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
 
