@@ -14,14 +14,7 @@ from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task.constants import (
-    EMPTY,
-    GIVE,
-    PICK_UP,
-    SEES_CUE,
-    SEES_EMPTY,
-    SEES_GOAL,
-)
+from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, SEES_CUE, SEES_EMPTY, SEES_GOAL
 from taichi_ants.task.events import Event
 
 if TYPE_CHECKING:
@@ -78,10 +71,7 @@ def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent
         foods = [side for side in range(3) if codes[side] == SEES_GOAL]
         if ant.carries or not foods:
             return Intent(ant, action)
-        side = foods[0]
-        if len(foods) > 1:
-            high, _ = ant.stream.draw()
-            side = foods[pick(high, len(foods))]
+        side = foods[pick(ant.stream.draw()[0], len(foods))] if len(foods) > 1 else foods[0]
         heading = (ant.heading + side - 1) % N_HEADINGS
         return Intent(ant, action, heading, neighbour(ant.cell, heading))
     heading = (ant.heading + action - 1) % N_HEADINGS

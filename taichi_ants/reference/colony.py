@@ -10,12 +10,7 @@ from functools import partial
 import numpy as np
 
 from taichi_ants.features.support import COLONY, refuse_unsupported
-from taichi_ants.grid.constants import (
-    N_HEADINGS,
-    STREAM_ANT,
-    STREAM_BORN,
-    STREAM_QUEEN,
-)
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_BORN, STREAM_QUEEN
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import frozen_policy
 from taichi_ants.reference.actions import Intent, carry_out, intend
@@ -33,7 +28,7 @@ from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS, learn_together
 from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, codes_in_view, observe
-from taichi_ants.reference.own_rules import choose_by_rule, pay, state_by
+from taichi_ants.reference.own_rules import choose_by_rule, pay, view_of
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task
@@ -108,7 +103,8 @@ class ReferenceColony:
             self._row = OBSERVATIONS[task.observation]
             self._turns = TURNS.get(task.observation, AHEAD)
         else:
-            self._row, self._turns = state_by(task.sees), task.sees.cells
+            self._row = lambda world, ant: int(task.sees.encode(view_of(world, ant, task.sees)))
+            self._turns = task.sees.cells
         self.start_world, self.training = world, training
         self.n_ants, self._ends_at_delivery = ants, ends_at_delivery
         self.slots = capacity or (2 * ants + 64 if task.life.births else ants)
@@ -335,8 +331,7 @@ class ReferenceColony:
             slot = next(free_slots, None)
             if slot is None or not free:
                 return
-            high, _ = self.queen_stream.draw()
-            heading = free[pick(high, len(free))]
+            heading = free[pick(self.queen_stream.draw()[0], len(free))]
             caste = draw_caste(self.castes, nest, self.starting[nest], self.queen_stream)
             self.new_ant(around[heading], heading, slot, nest, caste)
             self.stores[nest] -= 1
@@ -345,8 +340,7 @@ class ReferenceColony:
     def new_ant(self, cell: Cell, heading: int, slot: int, nest: int = 0, caste: int = 0) -> None:
         """Add a new ant to a slot and a cell."""
         number = self.next_number
-        state = stream_state(self.seed, STREAM_BORN, (self.episode << 32) + number)
-        stream = RandomStream(state)
+        stream = RandomStream(stream_state(self.seed, STREAM_BORN, (self.episode << 32) + number))
         ant = Ant(cell, heading, slot=slot, number=number, stream=stream, nest=nest, caste=caste)
         self.add(ant)
         if self.sharing == "independent":

@@ -131,8 +131,7 @@ class DynaQ(QLearning):
 
     def draw_seen(self, stream: RandomStream) -> Transition:
         """Return a random transition of the model."""
-        high, _ = stream.draw()
-        return list(self.model.values())[pick(high, len(self.model))]
+        return list(self.model.values())[pick(stream.draw()[0], len(self.model))]
 
 
 class DoubleQ(ReferenceLearner):
@@ -145,18 +144,16 @@ class DoubleQ(ReferenceLearner):
         self._tables = [[list(row) for row in self.rows] for _ in "AB"]
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
-        high, _ = stream.draw()
-        chosen = pick(high, 2)
+        chosen = pick(stream.draw()[0], 2)
         updated, other = self._tables[chosen], self._tables[1 - chosen]
         next_values = updated[step.next_state]
-        best = next_values.index(max(next_values))
-        next_value = other[step.next_state][best]
+        next_value = other[step.next_state][next_values.index(max(next_values))]
         target = np.float32(step.reward) + self.discount_of(step) * next_value
         state, action = step.pair
         error = target - updated[state][action]
         updated[state][action] = updated[state][action] + self.learning_rate * error
-        a, b = self._tables
-        self.rows[state][action] = (a[state][action] + b[state][action]) * np.float32(0.5)
+        both = updated[state][action] + other[state][action]
+        self.rows[state][action] = both * np.float32(0.5)
         return error
 
 
