@@ -36,8 +36,6 @@ from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
-SUPPORTS = COLONY
-
 
 @dataclass
 class EpisodeRecord:
@@ -72,6 +70,7 @@ class ReferenceColony:
         next_number: The number of the next ant that is added.
         stores: Food items that each queen will turn into ants.
         queen_stream: The queen's random stream, which continues; wandering food also uses it.
+        learns: Whether ants learn.
         learners: The tables: one for each slot if they are independent, else for each nest and
             caste; see `table_of`.
         epsilon, learning_rate: Values in the present episode, float64.
@@ -96,7 +95,7 @@ class ReferenceColony:
         q_values: np.ndarray | None = None,
     ) -> None:
         self.task = task = task or Task()
-        refuse_unsupported("the reference", task.uses(), SUPPORTS)
+        refuse_unsupported("the reference", task.uses(), COLONY)
         if training is None:  # ants choose without action values
             training = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
         if task.observation in OBSERVATIONS:
@@ -108,7 +107,8 @@ class ReferenceColony:
         self.start_world, self.training = world, training
         self.n_ants, self._ends_at_delivery = ants, ends_at_delivery
         self.slots = capacity or (2 * ants + 64 if task.life.births else ants)
-        self.seed, self.sharing, self.start = seed, sharing, start
+        self.seed, self.start = seed, start
+        self.sharing, self.learns = sharing, sharing != "frozen"
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         self._make = partial(LEARNERS[training.learner], training, task.n_states)
@@ -130,11 +130,6 @@ class ReferenceColony:
     def castes(self) -> list[Caste]:
         """The castes of the task, if any."""
         return list(self.task.castes.values())
-
-    @property
-    def learns(self) -> bool:
-        """Whether ants learn."""
-        return self.sharing != "frozen"
 
     def table_of(self, ant: Ant | Transition) -> int:
         """Return the number of the table of an ant."""

@@ -119,15 +119,11 @@ class DynaQ(QLearning):
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
         error = super().learn(step, epsilon, stream)
-        self.remember(step)
+        self.model[step.pair] = step
         for _ in range(int(self.settings["planning_steps"])):
             seen = self.draw_seen(stream)
             self.update(seen.pair, self.learning_rate, self.error(seen, epsilon))
         return error
-
-    def remember(self, step: Transition) -> None:
-        """Store a transition, which replaces the previous one of its pair."""
-        self.model[step.pair] = step
 
     def draw_seen(self, stream: RandomStream) -> Transition:
         """Return a random transition of the model."""
@@ -215,7 +211,7 @@ class PrioritizedSweeping(DynaQ):
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
         error = self.error(step, epsilon)
-        self.remember(step)
+        self.model[step.pair] = step
         self._priorities.setdefault(step.pair, np.float32(0))
         if self._matters(error):
             self._priorities[step.pair] = abs(error)
@@ -272,7 +268,7 @@ def learn_together(
     if isinstance(learner, DynaQ):
         # If several ants have the same pair, the model keeps that of the highest number.
         for step in sorted(steps, key=lambda step: (step.pair, step.number)):
-            learner.remember(step)
+            learner.model[step.pair] = step
         for _ in range(int(learner.settings["planning_steps"])):
             _update(learner, [learner.draw_seen(stream) for stream in streams], epsilon, weights)
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants.grid.constants import N_HEADINGS, STREAM_TRAIT
+from taichi_ants.grid.constants import STREAM_TRAIT
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.features.castes import caste_of
-from taichi_ants.reference.geometry import neighbour
+from taichi_ants.reference.geometry import distance
 from taichi_ants.reference.random_stream import WORDS, RandomStream, stream_state
 from taichi_ants.rules.functions import exp, log, power
 
@@ -75,8 +75,8 @@ def acted(colony: ReferenceColony, ant: Ant) -> bool:
     """Return whether a forager becomes idle, by a draw if it can."""
     caste, chance = caste_of(colony.task, ant), colony.task.labour.stop_probability
     queen = colony.world.queens[ant.nest]
-    at_nest = queen in [neighbour(ant.cell, heading) for heading in range(N_HEADINGS)]
-    if not chance or caste.threshold.distribution == "none" or ant.carries or not at_nest:
+    can_stop = chance and caste.threshold.distribution != "none" and not ant.carries
+    if not can_stop or distance(ant.cell, queen) != 1:
         return False
     high, _ = ant.stream.draw()
     return high < int(chance * WORDS)
