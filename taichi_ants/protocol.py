@@ -54,11 +54,6 @@ class ProtocolEvent(ShorthandSettings):
         interventions = (getattr(self, setting.name) for setting in fields(ProtocolEvent))
         return tuple(intervention for intervention in interventions if intervention is not None)
 
-    @property
-    def in_all_worlds(self) -> bool:
-        """Whether worlds of a colony share what an intervention changes."""
-        return any(intervention.in_all_worlds for intervention in self.interventions)
-
     def times(self, length: int) -> range:
         """Return the ticks of an episode at which the event can happen, after that many ticks.
 

@@ -93,10 +93,4 @@ def td_learner(
     """
     from taichi_ants.learners.memory import learn_by  # here, because it imports Taichi
 
-    return Learner(
-        name,
-        learn_by(td_error),
-        td_error=td_error,
-        draws_next_action=draws_next_action,
-        summary=summary,
-    )
+    return Learner(name, learn_by(td_error), None, td_error, draws_next_action, summary=summary)

@@ -163,8 +163,11 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
             ant.heading = intent.heading
         if slot in pushed:
             ant.cell, event = pushed[slot], Event.PUSHED
+        elif intent.action < PICK_UP and slot not in entered:
+            event = Event.BLOCKED
         elif intent.action < PICK_UP:
-            event = _move(intent, entered.get(slot))
+            ant.cell = entered[slot]
+            event = Event.ENTERED_CUE if intent.shows_cue else Event.ENTERED_EMPTY
         else:
             event = _handle(world, intent, slot in winning, task)
         if intent.rests:
@@ -210,13 +213,6 @@ def _marked(laid: str, intent: Intent, start: Cell, had_food: bool) -> list[Cell
     if ant.event is Event.DELIVERED and laid != "with_food":
         return [start]
     return [ant.cell] if ant.cell != start else []
-
-
-def _move(intent: Intent, destination: Cell | None) -> Event:
-    if destination is None:
-        return Event.BLOCKED
-    intent.ant.cell = destination
-    return Event.ENTERED_CUE if intent.shows_cue else Event.ENTERED_EMPTY
 
 
 def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:

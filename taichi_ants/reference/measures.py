@@ -114,16 +114,6 @@ MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
 }
 
 
-def occupancy(colony: ReferenceColony) -> dict[Cell, int]:
-    """Return the number of ants on each cell with ants."""
-    return dict(Counter(ant.cell for ant in colony.ants.values()))
-
-
-def new_deliveries(rows: Sequence[float]) -> float:
-    """Return the growth of the deliveries since the last row."""
-    return rows[-1] - (rows[-2] if len(rows) > 1 else 0)
-
-
 def synchrony(rows: Sequence[float], ants: int) -> float:
     """Return the variance of the activity in the rows, relative to that of independent ants."""
     known = [row for row in rows if row == row]

@@ -86,11 +86,9 @@ class Trail:
         """
         rule, level = self.rule, self._levels[cell]
         if rule.own_deposit is not None:
-            facts: dict[str, Any] = {
-                f"level_{name}": trail.level(cell) for name, trail in others.items()
-            }
-            for name in ("carried", "carries", "event", "paper_state", "trait"):
-                facts[name] = getattr(ant, name)
+            names = ("carried", "carries", "event", "paper_state", "trait")
+            facts = {name: getattr(ant, name) for name in names}
+            facts |= {f"level_{name}": trail.level(cell) for name, trail in others.items()}
             facts |= {"level": level, "tick": tick, **inputs}
             level = computed(rule.own_deposit, self._rules, facts)
             level = level if rule.dense else math.floor(level)
