@@ -48,29 +48,18 @@ def choose_by_rule(
             nearer[side] = world.has_compass(ant) and is_better(world, ant, cell)
             if task.traffic.shared and nestmate(world, ant, cell):
                 is_open[side] = ant.carries or task.traffic.follow
-    inputs = {
-        "values": list(values),
-        "codes": codes,
-        "is_open": is_open,
-        "nearer": nearer,
-        "paper_state": seen,
-        "epsilon": int(epsilon * WORDS) / WORDS,
-        "random": low / WORDS,
-        "random_2": high / WORDS,
-    }
+    inputs: dict[str, Any] = {"values": list(values), "codes": codes, "is_open": is_open}
+    inputs |= {"nearer": nearer, "paper_state": seen, "epsilon": int(epsilon * WORDS) / WORDS}
+    inputs |= {"random": low / WORDS, "random_2": high / WORDS}
     inputs |= _of_ant(world, ant, task, tick, ant.misread)
     return int(computed(rule, task.rules, inputs))
 
 
 def pay(world: WorldState, was: Ant, ant: Ant, rule: Rule, task: Task, tick: int) -> int:
     """Return the reward of an ant by your rule, after the tick; `was` is the ant before it."""
-    inputs = {
-        "reward": ant.reward,
-        "event": ant.event,
-        "paper_state": was.paper_state,
-        "next_paper_state": ant.paper_state,
-    }
-    return int(computed(rule, task.rules, inputs | _of_ant(world, ant, task, tick, ())))
+    inputs = {"paper_state": was.paper_state, "next_paper_state": ant.paper_state}
+    inputs |= {"reward": ant.reward, "event": ant.event, **_of_ant(world, ant, task, tick, ())}
+    return int(computed(rule, task.rules, inputs))
 
 
 def _of_ant(
