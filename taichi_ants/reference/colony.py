@@ -362,6 +362,7 @@ class ReferenceColony:
         `pairs` has each forager before and after the tick.
         """
         self.transitions = []
+        same = ("slot", "number", "action", "executed", "reward", "event", "nest", "caste")
         for was, ant in pairs:
             terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
             # After a delivery that terminates, the ant chooses at the start of its next tick.
@@ -370,24 +371,15 @@ class ReferenceColony:
                 ant.chosen = self._draw_action(ant, self.record.ticks + 1)
             self.transitions.append(
                 Transition(
-                    slot=ant.slot,
-                    number=ant.number,
+                    **{name: getattr(ant, name) for name in same},
+                    **{name: getattr(was, name) for name in ("cell", "heading", "state")},
                     episode=self.episode,
                     step=self.record.ticks,
-                    cell=was.cell,
-                    heading=was.heading,
-                    state=was.state,
-                    action=ant.action,
-                    executed=ant.executed,
-                    reward=ant.reward,
-                    event=ant.event,
                     next_state=ant.state,
                     next_action=ant.chosen,
                     terminated=terminated,
                     truncated=not terminated
                     and (last or ant.slot not in self.ants or ant.slot in stopping),
-                    nest=ant.nest,
-                    caste=ant.caste,
                 )
             )
         members: dict[int, list[tuple[Ant, Transition]]] = defaultdict(list)

@@ -17,10 +17,8 @@ if TYPE_CHECKING:
     from taichi_ants.reference.world_state import WorldState
     from taichi_ants.task import Threshold
 
-ReferenceColony = Any  # which imports this file
 
-
-def born(colony: ReferenceColony, ant: Ant) -> None:
+def born(colony: Any, ant: Ant) -> None:
     """Draw the threshold of an ant, which is idle if it has one."""
     threshold = caste_of(colony.task, ant).threshold
     ant.own["threshold"] = draw_threshold(threshold, colony.seed, ant.number)
@@ -52,7 +50,7 @@ def draw_threshold(threshold: Threshold, seed: int, number: int) -> np.float32:
             return np.float32(value + spread * z)
 
 
-def choose(colony: ReferenceColony, ant: Ant) -> bool:
+def choose(colony: Any, ant: Ant) -> bool:
     """Let an idle ant start to forage, by a draw; return whether it stays idle."""
     if not ant.own["idle"]:
         return False
@@ -65,13 +63,13 @@ def choose(colony: ReferenceColony, ant: Ant) -> bool:
     return ant.own["idle"]
 
 
-def delivered(colony: ReferenceColony, nest: int, n: int) -> None:
+def delivered(colony: Any, nest: int, n: int) -> None:
     """Lower the stimulus of a nest."""
     values, relief = colony.world.of_nests[nest], (colony.task.labour.relief or 0.0) * n
     values["stimulus"] = max(0.0, values["stimulus"] - relief)
 
 
-def acted(colony: ReferenceColony, ant: Ant) -> bool:
+def acted(colony: Any, ant: Ant) -> bool:
     """Return whether a forager becomes idle, by a draw if it can."""
     caste, chance = caste_of(colony.task, ant), colony.task.labour.stop_probability
     queen = colony.world.queens[ant.nest]
@@ -82,12 +80,12 @@ def acted(colony: ReferenceColony, ant: Ant) -> bool:
     return high < int(chance * WORDS)
 
 
-def stopped(colony: ReferenceColony, ant: Ant) -> None:
+def stopped(colony: Any, ant: Ant) -> None:
     """Make an ant idle."""
     ant.own["idle"] = True
 
 
-def tick_ended(colony: ReferenceColony, nest: int) -> None:
+def tick_ended(colony: Any, nest: int) -> None:
     """Raise the stimulus of a nest."""
     colony.world.of_nests[nest]["stimulus"] += colony.task.labour.demand or 0.0
 

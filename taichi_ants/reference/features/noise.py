@@ -8,10 +8,8 @@ from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.random_stream import WORDS, pick
 from taichi_ants.task.constants import N_ACTIONS
 
-ReferenceColony = Any  # which imports this file
 
-
-def execute(colony: ReferenceColony, ant: Ant, action: int) -> int:
+def execute(colony: Any, ant: Ant, action: int) -> int:
     """Return the action that an ant executes instead of the one it chose."""
     if (slip := colony.task.noise.slip) == 0:
         return action
@@ -19,7 +17,7 @@ def execute(colony: ReferenceColony, ant: Ant, action: int) -> int:
     return pick(low, N_ACTIONS) if high < int(slip * WORDS) else action
 
 
-def see(colony: ReferenceColony, ant: Ant, code: int) -> int:
+def see(colony: Any, ant: Ant, code: int) -> int:
     """Return the code that an ant sees instead of the true one."""
     if (misread := colony.task.noise.misread) == 0:
         return code
