@@ -193,9 +193,7 @@ def _colonies(task: Task, seed: int) -> tuple[Colony, ReferenceColony]:
 
 def _difference(colony: Colony, plain: ReferenceColony) -> str:
     """Return the first difference of a colony from its reference, or an empty string."""
-    grid, fields, trails = colony.grid, colony.snapshot().fields, plain.world.pheromones
-    cells = list(plain.world.ground)
-    places = grid.index(np.array(cells, np.int64).reshape(-1, 3))
+    ours, grid = colony.snapshot(), colony.grid
     order = np.argsort(colony.numbers[0])
     ants = [plain.ants[slot] for slot in sorted(plain.ants, key=lambda n: plain.ants[n].number)]
     pairs = {
@@ -207,12 +205,13 @@ def _difference(colony: Colony, plain: ReferenceColony) -> str:
         "actions": (colony.actions[0, order], [ant.action for ant in ants]),
         "events": (colony.events[0, order], [ant.event for ant in ants]),
         "rewards": (colony.rewards[0, order], [ant.reward for ant in ants]),
-        **{
-            f"levels of {name}": (fields[name][places], [trail.level(cell) for cell in cells])
-            for name, trail in trails.items()
-        },
-        "action values": (colony.q_values[0], plain.q_values),
     }
+    ground = list(plain.world.ground)
+    places = grid.index(np.array(ground, np.int64).reshape(-1, 3))
+    for name, trail in plain.world.pheromones.items():
+        levels = [trail.level(cell) for cell in ground]
+        pairs[f"levels of {name}"] = ours.fields[name][places], levels
+    pairs["action values"] = colony.q_values[0], plain.q_values
     for what, (kernel, twin) in pairs.items():
         expected = np.asarray(twin).astype(kernel.dtype)
         if not np.array_equal(kernel, expected):
