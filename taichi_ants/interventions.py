@@ -27,7 +27,7 @@ from taichi_ants.errors import (
     is_flag,
     refuse,
 )
-from taichi_ants.features import fixed_in
+from taichi_ants.features import FEATURES
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.settings import (
     Setting,
@@ -331,7 +331,8 @@ class SetTask(Intervention, path="task"):
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         changed = self.changed(task)
         castes, new_castes = (
-            {name: fixed_in(caste) for name, caste in one.castes.items()} for one in (task, changed)
+            {n: [one.fixed(caste) for one in FEATURES] for n, caste in rules.castes.items()}
+            for rules in (task, changed)
         )
         if castes != new_castes or Model(task, learns) != Model(changed, learns):
             old, new = flat(task.as_dict()), flat(changed.as_dict())

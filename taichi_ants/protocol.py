@@ -21,6 +21,7 @@ from taichi_ants.settings import Setting
 from taichi_ants.task.constants import MAX_STEPS
 
 Tick = Annotated[int, Setting(unit="ticks of the episode", least=0, most=MAX_STEPS)]
+Bound = Annotated[int | None, Setting(unit="ticks of the episode", least=0, most=MAX_STEPS)]
 Interval = Annotated[int, Setting(unit="ticks", least=1, most=MAX_STEPS)]
 
 
@@ -52,11 +53,6 @@ class ProtocolEvent(ShorthandSettings):
         """The interventions, in the order in which they are applied."""
         interventions = (getattr(self, setting.name) for setting in fields(ProtocolEvent))
         return tuple(intervention for intervention in interventions if intervention is not None)
-
-    @property
-    def in_all_worlds(self) -> bool:
-        """Whether worlds of a colony share what an intervention changes."""
-        return any(intervention.in_all_worlds for intervention in self.interventions)
 
     def times(self, length: int) -> range:
         """Return the ticks of an episode at which the event can happen, after that many ticks.
@@ -93,17 +89,8 @@ class Every(ProtocolEvent, path="every"):
     """Interventions at regular ticks of each episode."""
 
     ticks: Annotated[Interval, Setting("time between two events")]
-    start: Annotated[
-        int | None,
-        Setting("time of the first event; `ticks` if left out", unit="ticks of the episode"),
-        Setting(least=0, most=MAX_STEPS),
-    ] = None
-    stop: Annotated[
-        int | None,
-        Setting(
-            "time of the last possible event", unit="ticks of the episode", least=0, most=MAX_STEPS
-        ),
-    ] = None
+    start: Annotated[Bound, Setting("time of the first event; `ticks` if left out")] = None
+    stop: Annotated[Bound, Setting("time of the last possible event")] = None
 
     def check(self) -> None:
         super().check()
@@ -126,8 +113,8 @@ class When(ProtocolEvent, path="when"):
     """Interventions when a measure of a world is above or below a bound.
 
     Each world is checked for itself, every `interval` ticks. While the measure has no value, the
-    event does not happen. With `once`, the event happens at most
-    once in an episode, else at each check for which the condition holds.
+    event does not happen. With `once`, the event happens at most once in an episode, else at each
+    check for which the condition holds.
     """
 
     measure: Annotated[str, Setting("name of a registered measure")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.rules import Rule
 from taichi_ants.settings import declared
-from taichi_ants.task import Observation, Task, observations
+from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds import World
@@ -91,8 +91,13 @@ def check_observation(name: str) -> RuleCheck:
     """
     observation = observations.get(name)
     runtime.start()
-    ticks, fault = _compared(lambda seed: _task_of(observation, seed))
-    return RuleCheck(name, 0, ticks, fault, observation.reads)
+
+    def task_of(seed: int) -> Task:  # kernels are compiled for two tasks only
+        noise, cue = {"misread": 0.2 * (seed % 2)}, ("compass", "trail")[seed % 2]
+        common = _common(observation.reads, seed % 2)
+        return common.replace(observation=name, homing_cue=cue, noise=noise)
+
+    return RuleCheck(name, 0, *_compared(task_of), observation.reads)
 
 
 def check_learner(name: str) -> str:
@@ -114,9 +119,12 @@ def _compared(task_of: Callable[[int], Task]) -> tuple[int, str]:
     ticks = 0
     try:
         for seed in range(SEEDS):
-            for fault in _differences(task_of(seed), seed):
-                if fault:
-                    return ticks, fault
+            colony, plain = _colonies(task_of(seed), seed)
+            for tick in range(TICKS):
+                colony.tick()
+                plain.tick(last=tick == TICKS - 1)
+                if fault := _difference(colony, plain):
+                    return ticks, f"seed {seed}, tick {tick}: {fault}"
                 ticks += 1
     except AntsError:
         raise
@@ -150,16 +158,6 @@ def _task(rule: Rule, seed: int) -> Task:
     return _common(rule.fields, drawn).replace(**settings)
 
 
-def _task_of(observation: Observation, seed: int) -> Task:
-    """Return a drawn task with an observation; kernels are compiled for two tasks only."""
-    drawn = seed % 2
-    return _common(observation.reads, drawn).replace(
-        observation=observation.name,
-        homing_cue=("compass", "trail")[drawn],
-        noise={"misread": 0.2 * drawn},
-    )
-
-
 def _common(fields: Iterable[str], drawn: int) -> Task:
     """Return a task with further pheromones of these names."""
     return Task().replace(
@@ -180,8 +178,8 @@ def _world(seed: int) -> World:
     return World(world.ranges, [world.queen, other], world.foods, world.obstacles)
 
 
-def _differences(task: Task, seed: int) -> Iterator[str]:
-    """Yield, after each tick of a drawn colony, its first difference from the reference, or ""."""
+def _colonies(task: Task, seed: int) -> tuple[Colony, ReferenceColony]:
+    """Return a drawn colony and its reference at the start of an episode."""
     world = _world(seed)
     learner = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 1.0) if task.choice.needs_table else None
     sharing = "frozen" if learner is None else "shared"
@@ -190,11 +188,7 @@ def _differences(task: Task, seed: int) -> Iterator[str]:
     plain = ReferenceColony(world, task, learner, seed, 12, sharing=sharing)
     colony.begin_episode(TICKS)
     plain.begin_episode()
-    for tick in range(TICKS):
-        colony.tick()
-        plain.tick(last=tick == TICKS - 1)
-        fault = _difference(colony, plain)
-        yield fault and f"seed {seed}, tick {tick}: {fault}"
+    return colony, plain
 
 
 def _difference(colony: Colony, plain: ReferenceColony) -> str:

@@ -52,16 +52,6 @@ def arrays(per: str) -> Iterator[tuple[Feature, Array]]:
                 yield feature, array
 
 
-def fixed_in(caste: Any) -> list[Any]:
-    """Return what of a caste cannot change in an episode."""
-    return [feature.fixed(caste) for feature in FEATURES]
-
-
-def feature_of_input(name: str) -> Feature | None:
-    """Return the feature that has an input of your rules; None if none has it."""
-    return next((feature for feature in FEATURES if name in feature.inputs), None)
-
-
 def numbers_of_castes(features: tuple[Feature, ...]) -> dict[str, Any]:
     """Return the numbers of castes that features declare, by name, in order."""
     return {name: of for feature in features for name, of in feature.of_castes.items()}

@@ -121,17 +121,13 @@ class Caste(Settings, path="task.castes.NAME"):
             return list(names) if self.lays == ALL else []
         return [name.strip() for name in self.lays.split(",")]
 
-    def is_in(self, nest: int) -> bool:
-        """Return whether a nest has the caste."""
-        return self.nest in (None, nest)
-
 
 def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
     """Return the share of each caste in the ants of a nest that `ants` does not give to castes.
 
     AntsError if the nest has no caste, or shares do not add up to 1.
     """
-    ours = [caste for caste in castes.values() if caste.is_in(nest)]
+    ours = [caste for caste in castes.values() if caste.nest in (None, nest)]
     if not ours:
         raise AntsError(
             f"`task.castes` has no caste for nest {nest}; add one, or leave `nest` out of a caste."
@@ -145,14 +141,17 @@ def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
             "up to 1, or to less if another caste has neither `share` nor `ants`."
         )
     equal = max(left, 0.0) / n_open if n_open else 0.0
-    usual = [equal if caste.share is None else caste.share for caste in castes.values()]
-    given = [caste.is_in(nest) and caste.ants is None for caste in castes.values()]
-    return [share if has_share else 0.0 for share, has_share in zip(usual, given, strict=True)]
+    return [
+        0.0
+        if caste.nest not in (None, nest) or caste.ants is not None
+        else (equal if caste.share is None else caste.share)
+        for caste in castes.values()
+    ]
 
 
 def _fixed_in(castes: Mapping[str, Caste], nest: int) -> list[int]:
     """Return the number `ants` of each caste in a nest, 0 without one."""
-    return [(caste.ants or 0) * caste.is_in(nest) for caste in castes.values()]
+    return [(caste.ants or 0) * (caste.nest in (None, nest)) for caste in castes.values()]
 
 
 def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
@@ -223,20 +222,12 @@ def _lays(task: Task, caste: Caste) -> int:
     return sum(1 << names.index(name) for name in set(caste.pheromones_laid(names)))
 
 
-def _of_choice(name: str) -> Callable[[Task, Caste], float]:
-    def of(task: Task, caste: Caste) -> float:
-        own = getattr(caste, name)
-        return (getattr(task.choice, name) or 0.0) if own is None else own
-
-    return of
-
-
-def _own(name: str) -> Callable[[Task, Caste], float]:
-    """Return a function of the number of a caste, -1 if it has that of the colony."""
+def _own(name: str, of_choice: bool = False) -> Callable[[Task, Caste], float]:
+    """Return a function of the number of a caste: that of the colony is -1, or that of choices."""
 
     def of(task: Task, caste: Caste) -> float:
-        own = getattr(caste, name)
-        return -1.0 if own is None else own
+        default = (getattr(task.choice, name) or 0.0) if of_choice else -1.0
+        return default if getattr(caste, name) is None else getattr(caste, name)
 
     return of
 
@@ -251,11 +242,8 @@ CASTES = Feature(
     of_castes={
         "epsilon": _own("epsilon"),
         "epsilon_spread": lambda task, caste: caste.epsilon_spread or 0.0,
-        "learning_rate": _own("learning_rate"),
-        "discount": _own("discount"),
-        "temperature": _of_choice("temperature"),
-        "k": _of_choice("k"),
-        "exponent": _of_choice("exponent"),
+        **{name: _own(name) for name in ("learning_rate", "discount")},
+        **{name: _own(name, of_choice=True) for name in ("temperature", "k", "exponent")},
         "learns": lambda task, caste: caste.policy is None,
         "lays": _lays,
         "cues": lambda task, caste: task.all_cues.index(task.cues_of(caste)),

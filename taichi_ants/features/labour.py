@@ -43,6 +43,7 @@ from taichi_ants.settings import Setting, Settings
 
 LabourRule = Literal["none", "thresholds"]
 Stimulus = Annotated[float | None, Setting(least=0, most=1e6)]
+_UNIT = "units of stimulus"
 _DIVIDES = Setting(only=("rule", "thresholds"))
 Distribution = Literal["none", "fixed", "uniform", "normal", "lognormal"]
 DISTRIBUTIONS: tuple[str, ...] = get_args(Distribution)
@@ -77,7 +78,7 @@ class Labour(Settings, path="task.labour"):
     ] = None
     relief: Annotated[
         Stimulus,
-        Setting("fall of the stimulus with each delivery", unit="units of stimulus", usual=10.0),
+        Setting("fall of the stimulus with each delivery", unit=_UNIT, usual=10.0),
         _DIVIDES,
     ] = None
     exponent: Annotated[
@@ -116,7 +117,7 @@ class Threshold(Settings, path="task.castes.NAME.threshold"):
     ] = "none"
     value: Annotated[
         Stimulus,
-        Setting("threshold, or the middle of its distribution", unit="units of stimulus"),
+        Setting("threshold, or the middle of its distribution", unit=_UNIT),
         Setting(usual=10.0, only=("distribution", *DISTRIBUTIONS[1:])),
     ] = None
     spread: Annotated[
@@ -176,16 +177,8 @@ LABOUR = Feature(
     Labour,
     arrays=(
         Array("idle", ANT, "i1", "idle", "bool", "idle", "yes, no"),
-        Array(
-            "threshold",
-            ANT,
-            "f4",
-            "thresholds",
-            "f4",
-            "response threshold",
-            unit="units of stimulus",
-        ),
-        Array("stimulus", NEST, "f8", "stimuli", "f8", "stimulus", unit="units of stimulus"),
+        Array("threshold", ANT, "f4", "thresholds", "f4", "response threshold", unit=_UNIT),
+        Array("stimulus", NEST, "f8", "stimuli", "f8", "stimulus", unit=_UNIT),
     ),
     numbers=("demand", "relief", "exponent"),
     of_castes={

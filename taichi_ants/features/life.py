@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from taichi_ants.features.feature import ANT, Array, Feature, Task, ti
+from taichi_ants.features.feature import ANT, Array, Feature, ti
 from taichi_ants.grid.constants import MAX_STEPS
 from taichi_ants.settings import Setting, Settings
 
@@ -45,15 +45,10 @@ class Life(Settings, path="task.life"):
     ] = None
 
 
-def _ages(task: Task) -> bool:
-    spans = (task.life.lifespan, *(caste.lifespan for caste in task.castes.values()))
-    return any(span is not None for span in spans)
-
-
 AGE = Feature(
     Life,
     switch="lifespan",
-    uses=_ages,
+    uses=lambda task: any(one.lifespan is not None for one in (task.life, *task.castes.values())),
     kills=True,
     arrays=(Array("age", ANT, "i4", "ages", "i4", "age", unit="ticks"),),
     of_castes={"lifespan": lambda task, caste: caste.lifespan or task.life.lifespan or -1},

@@ -89,15 +89,8 @@ def td_learner(
             `value` is that of the state-action pair to update; `discount` is 0 if the step
             terminated; `next_values` is the vector of the five action values of the next state.
             `next_action` is i32, all others are f32; it is 0 if the step terminated, and allowed
-            only with `draws_next_action`. To try
-            your learner, run `taichi-ants check FILE`.
+            only with `draws_next_action`. To try your learner, run `taichi-ants check FILE`.
     """
     from taichi_ants.learners.memory import learn_by  # here, because it imports Taichi
 
-    return Learner(
-        name,
-        learn_by(td_error),
-        td_error=td_error,
-        draws_next_action=draws_next_action,
-        summary=summary,
-    )
+    return Learner(name, learn_by(td_error), None, td_error, draws_next_action, summary=summary)

@@ -137,10 +137,8 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
     for letters, action in rule:
         cells = [move for move in (LEFT, FORWARD, RIGHT) if view[move] in letters]
         ahead = [move for move in cells if move == FORWARD]
-        if cells and action == "take":
-            return [takes]
-        if cells and action == "stay":
-            return [fails]
+        if cells and action in ("take", "stay"):
+            return [takes if action == "take" else fails]
         if action == "ahead":
             cells = ahead
         # Next to an obstacle, walking straight would follow a wall around the world forever.
@@ -191,7 +189,7 @@ def save_policy(
         metadata: Origin of the policy (configuration, seed, world ...), in types of JSON.
         observation: Name of the registered observation whose states index the rows.
     """
-    table = _checked(q_values, observation)
+    table = checked_table(q_values, Task(observations.get(observation).name))
     expect("metadata", metadata, Mapping)
     to_json(metadata)  # raises TypeError
     _KIND.write(path, {"observation": observation, "metadata": metadata}, {"q_values": table})
@@ -202,12 +200,8 @@ def load_policy(path: PathLike) -> Policy:
     with _KIND.reading(path) as (arrays, facts):
         observation, metadata = facts["observation"], facts["metadata"]
         expect("metadata", metadata, dict)
-        table = _checked(arrays["q_values"], observation)
+        table = checked_table(arrays["q_values"], Task(observations.get(observation).name))
         return Policy(table, observation, metadata)
-
-
-def _checked(q_values: npt.ArrayLike, observation: str) -> ActionValues:
-    return checked_table(q_values, Task(observations.get(observation).name))
 
 
 def checked_values(q_values: Any, task: Task) -> np.ndarray:
@@ -228,12 +222,12 @@ def checked_values(q_values: Any, task: Task) -> np.ndarray:
 def checked_table(q_values: Any, task: Task) -> np.ndarray:
     """Return the one table of `q_values`, float32 (n_states, 5); AntsError if it has several."""
     tables = checked_values(q_values, task)
-    if math.prod(tables.shape[:-2]) > 1:
+    if (n := math.prod(tables.shape[:-2])) > 1:
         whose = "its " if hasattr(q_values, "q_values") else ""
         places = ", ".join("0" * (tables.ndim - 2))
         raise AntsError(
-            f"q_values has shape {tables.shape}, which is {math.prod(tables.shape[:-2])} tables; "
-            f"give one of them, for example {whose}q_values[{places}]."
+            f"q_values has shape {tables.shape}, which is {n} tables; give one of them, for "
+            f"example {whose}q_values[{places}]."
         )
     return tables.reshape(tables.shape[-2:])
 

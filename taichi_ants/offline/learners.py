@@ -61,10 +61,7 @@ def batch_q_learning(
 
 @checked_arguments
 def fitted_q_iteration(
-    data: Dataset,
-    discount: Discount = 0.9,
-    initial_q: InitialValue = 0.0,
-    by_run: Flag = False,
+    data: Dataset, discount: Discount = 0.9, initial_q: InitialValue = 0.0, by_run: Flag = False
 ) -> np.ndarray:
     """Return the optimal action values of the empirical model of the data, see `EmpiricalModel`.
 

@@ -14,14 +14,7 @@ from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task.constants import (
-    EMPTY,
-    GIVE,
-    PICK_UP,
-    SEES_CUE,
-    SEES_EMPTY,
-    SEES_GOAL,
-)
+from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, SEES_CUE, SEES_EMPTY, SEES_GOAL
 from taichi_ants.task.events import Event
 
 if TYPE_CHECKING:
@@ -78,10 +71,7 @@ def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent
         foods = [side for side in range(3) if codes[side] == SEES_GOAL]
         if ant.carries or not foods:
             return Intent(ant, action)
-        side = foods[0]
-        if len(foods) > 1:
-            high, _ = ant.stream.draw()
-            side = foods[pick(high, len(foods))]
+        side = foods[pick(ant.stream.draw()[0], len(foods))] if len(foods) > 1 else foods[0]
         heading = (ant.heading + side - 1) % N_HEADINGS
         return Intent(ant, action, heading, neighbour(ant.cell, heading))
     heading = (ant.heading + action - 1) % N_HEADINGS
@@ -173,8 +163,11 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
             ant.heading = intent.heading
         if slot in pushed:
             ant.cell, event = pushed[slot], Event.PUSHED
+        elif intent.action < PICK_UP and slot not in entered:
+            event = Event.BLOCKED
         elif intent.action < PICK_UP:
-            event = _move(intent, entered.get(slot))
+            ant.cell = entered[slot]
+            event = Event.ENTERED_CUE if intent.shows_cue else Event.ENTERED_EMPTY
         else:
             event = _handle(world, intent, slot in winning, task)
         if intent.rests:
@@ -220,13 +213,6 @@ def _marked(laid: str, intent: Intent, start: Cell, had_food: bool) -> list[Cell
     if ant.event is Event.DELIVERED and laid != "with_food":
         return [start]
     return [ant.cell] if ant.cell != start else []
-
-
-def _move(intent: Intent, destination: Cell | None) -> Event:
-    if destination is None:
-        return Event.BLOCKED
-    intent.ant.cell = destination
-    return Event.ENTERED_CUE if intent.shows_cue else Event.ENTERED_EMPTY
 
 
 def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:

@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
-from taichi_ants.reference.geometry import (
-    Cell,
-    distance,
-    existing_cells,
-    listed_cells,
-    queens_of,
-)
+from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells, queens_of
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.task.events import Event
 

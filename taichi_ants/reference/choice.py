@@ -15,7 +15,7 @@ from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import neighbour
 from taichi_ants.reference.observations import is_better, nestmate
-from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.reference.random_stream import WORDS, RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.rules.functions import exp, power
 from taichi_ants.task.constants import (
@@ -33,8 +33,6 @@ from taichi_ants.task.constants import (
 if TYPE_CHECKING:
     from taichi_ants.task import Choice, Traffic
 
-_WORDS = 4294967296.0
-
 
 def choose_action(
     values: Sequence[np.float32], epsilon: float, stream: RandomStream, choice: Choice | None = None
@@ -45,7 +43,7 @@ def choose_action(
     proportional to exp(values[a] / temperature).
     """
     high, low = stream.draw()
-    if high < int(epsilon * _WORDS):
+    if high < int(epsilon * WORDS):
         return pick(low, N_ACTIONS)
     best_value = max(values)
     if choice is not None and choice.rule == "softmax":
@@ -61,7 +59,7 @@ def weighted(weights: Sequence[float], word: int) -> int:
     total = 0.0
     for weight in weights:
         total = total + weight
-    drawn = word / _WORDS * total
+    drawn = word / WORDS * total
     cumulative = 0.0
     for index, weight in enumerate(weights[:-1]):
         cumulative = cumulative + weight

@@ -10,12 +10,7 @@ from functools import partial
 import numpy as np
 
 from taichi_ants.features.support import COLONY, refuse_unsupported
-from taichi_ants.grid.constants import (
-    N_HEADINGS,
-    STREAM_ANT,
-    STREAM_BORN,
-    STREAM_QUEEN,
-)
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_BORN, STREAM_QUEEN
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import frozen_policy
 from taichi_ants.reference.actions import Intent, carry_out, intend
@@ -33,15 +28,13 @@ from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS, learn_together
 from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, codes_in_view, observe
-from taichi_ants.reference.own_rules import choose_by_rule, pay, state_by
+from taichi_ants.reference.own_rules import choose_by_rule, pay, view_of
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task
 from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
-
-SUPPORTS = COLONY
 
 
 @dataclass
@@ -77,6 +70,7 @@ class ReferenceColony:
         next_number: The number of the next ant that is added.
         stores: Food items that each queen will turn into ants.
         queen_stream: The queen's random stream, which continues; wandering food also uses it.
+        learns: Whether ants learn.
         learners: The tables: one for each slot if they are independent, else for each nest and
             caste; see `table_of`.
         epsilon, learning_rate: Values in the present episode, float64.
@@ -101,18 +95,20 @@ class ReferenceColony:
         q_values: np.ndarray | None = None,
     ) -> None:
         self.task = task = task or Task()
-        refuse_unsupported("the reference", task.uses(), SUPPORTS)
+        refuse_unsupported("the reference", task.uses(), COLONY)
         if training is None:  # ants choose without action values
             training = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
         if task.observation in OBSERVATIONS:
             self._row = OBSERVATIONS[task.observation]
             self._turns = TURNS.get(task.observation, AHEAD)
         else:
-            self._row, self._turns = state_by(task.sees), task.sees.cells
+            self._row = lambda world, ant: int(task.sees.encode(view_of(world, ant, task.sees)))
+            self._turns = task.sees.cells
         self.start_world, self.training = world, training
         self.n_ants, self._ends_at_delivery = ants, ends_at_delivery
         self.slots = capacity or (2 * ants + 64 if task.life.births else ants)
-        self.seed, self.sharing, self.start = seed, sharing, start
+        self.seed, self.start = seed, start
+        self.sharing, self.learns = sharing, sharing != "frozen"
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         self._make = partial(LEARNERS[training.learner], training, task.n_states)
@@ -134,11 +130,6 @@ class ReferenceColony:
     def castes(self) -> list[Caste]:
         """The castes of the task, if any."""
         return list(self.task.castes.values())
-
-    @property
-    def learns(self) -> bool:
-        """Whether ants learn."""
-        return self.sharing != "frozen"
 
     def table_of(self, ant: Ant | Transition) -> int:
         """Return the number of the table of an ant."""
@@ -335,8 +326,7 @@ class ReferenceColony:
             slot = next(free_slots, None)
             if slot is None or not free:
                 return
-            high, _ = self.queen_stream.draw()
-            heading = free[pick(high, len(free))]
+            heading = free[pick(self.queen_stream.draw()[0], len(free))]
             caste = draw_caste(self.castes, nest, self.starting[nest], self.queen_stream)
             self.new_ant(around[heading], heading, slot, nest, caste)
             self.stores[nest] -= 1
@@ -345,8 +335,7 @@ class ReferenceColony:
     def new_ant(self, cell: Cell, heading: int, slot: int, nest: int = 0, caste: int = 0) -> None:
         """Add a new ant to a slot and a cell."""
         number = self.next_number
-        state = stream_state(self.seed, STREAM_BORN, (self.episode << 32) + number)
-        stream = RandomStream(state)
+        stream = RandomStream(stream_state(self.seed, STREAM_BORN, (self.episode << 32) + number))
         ant = Ant(cell, heading, slot=slot, number=number, stream=stream, nest=nest, caste=caste)
         self.add(ant)
         if self.sharing == "independent":
@@ -373,6 +362,7 @@ class ReferenceColony:
         `pairs` has each forager before and after the tick.
         """
         self.transitions = []
+        same = ("slot", "number", "action", "executed", "reward", "event", "nest", "caste")
         for was, ant in pairs:
             terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
             # After a delivery that terminates, the ant chooses at the start of its next tick.
@@ -381,24 +371,15 @@ class ReferenceColony:
                 ant.chosen = self._draw_action(ant, self.record.ticks + 1)
             self.transitions.append(
                 Transition(
-                    slot=ant.slot,
-                    number=ant.number,
+                    **{name: getattr(ant, name) for name in same},
+                    **{name: getattr(was, name) for name in ("cell", "heading", "state")},
                     episode=self.episode,
                     step=self.record.ticks,
-                    cell=was.cell,
-                    heading=was.heading,
-                    state=was.state,
-                    action=ant.action,
-                    executed=ant.executed,
-                    reward=ant.reward,
-                    event=ant.event,
                     next_state=ant.state,
                     next_action=ant.chosen,
                     terminated=terminated,
                     truncated=not terminated
                     and (last or ant.slot not in self.ants or ant.slot in stopping),
-                    nest=ant.nest,
-                    caste=ant.caste,
                 )
             )
         members: dict[int, list[tuple[Ant, Transition]]] = defaultdict(list)

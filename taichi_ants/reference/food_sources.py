@@ -99,8 +99,7 @@ class FoodSources:
         ahead.
         """
         for pile in sorted({source.pile for source in self.food_sources}):
-            high, _ = stream.draw()
-            heading = pick(high, N_HEADINGS)
+            heading = pick(stream.draw()[0], N_HEADINGS)
             members = [source for source in self.food_sources if source.pile == pile]
             for source in _front_first(members, heading):
                 ahead = neighbour(source.cell, heading)

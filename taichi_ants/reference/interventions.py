@@ -24,7 +24,6 @@ from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds.world import World
 
 REACH = 8  # the most cells by which an ant is moved aside
-_CONTENTS = {"rock": OBSTACLE, "food": FOOD}
 
 
 class Interventions:
@@ -36,10 +35,7 @@ class Interventions:
 
     def __init__(self, colony: ReferenceColony) -> None:
         self.colony, self.ants, self._first = colony, colony.n_ants, colony.start_world
-        # The content of cells when later episodes start, with the nest or the kind of food.
-        self._later = {cell: (QUEEN, nest) for nest, cell in enumerate(colony.world.queens)}
-        self._later |= {cell: (FOOD, kind) for cell, kind in kinds_of_food(self._first).items()}
-        self._later |= dict.fromkeys(listed_cells(self._first.obstacles), (OBSTACLE, 0))
+        self._foods = kinds_of_food(self._first)  # when later episodes start
         self._set_stream()
 
     def _set_stream(self) -> None:
@@ -60,10 +56,9 @@ class Interventions:
                 colony.epsilon = change.value
                 colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
             case language.SetLearningRate():
-                colony.training = replace(
-                    colony.training, learning_rate_decay=1.0, min_learning_rate=0.0
-                )
                 colony.learning_rate = change.value
+                constant: dict[str, Any] = {"learning_rate_decay": 1.0, "min_learning_rate": 0.0}
+                colony.training = replace(colony.training, **constant)
             case language.SetTask():
                 colony.task = change.changed(colony.task)
                 world.take(colony.task, colony.learns)
@@ -101,7 +96,8 @@ class Interventions:
             case language.Place():
                 names = list(self.colony.task.foods)
                 kind = names.index(change.kind) if change.kind else 0
-                self._put(cells, _CONTENTS[change.what], kind, world.full(kind))
+                what = OBSTACLE if change.what == "rock" else FOOD
+                self._put(cells, what, kind, world.full(kind))
             case language.Clear():
                 self._put(cells, EMPTY)
             case language.Move():
@@ -132,17 +128,17 @@ class Interventions:
     def _put(self, cells: Sequence[Cell], what: int, kind: int = 0, loads: int = 1) -> None:
         """Make cells EMPTY, OBSTACLE or FOOD, now and later, except those of ants and queens."""
         world = self.colony.world
-        if what != EMPTY:
-            self._move_aside(cells)
+        self._move_aside(cells if what != EMPTY else ())
         for cell in cells:
             if cell in world.ants or cell in world.queens:
                 continue
-            world.ground[cell], self._later[cell] = what, (what, kind)
+            world.ground[cell] = what
             if what == FOOD:
+                self._foods[cell] = kind
                 world.put_food(cell, kind, loads)
                 self.colony.food_sources.put(cell, kind)
             else:
-                self.colony.food_sources.end(cell)
+                self._end_food(cell)
         world.take(self.colony.task, self.colony.learns)  # rocks have no trail
 
     def _move_aside(self, cells: Sequence[Cell]) -> None:
@@ -177,7 +173,11 @@ class Interventions:
         assert world.content(cell) == EMPTY
         old, world.queens[nest] = world.queens[nest], cell
         world.ground[old], world.ground[cell] = EMPTY, QUEEN
-        self._later[old], self._later[cell] = (EMPTY, 0), (QUEEN, nest)
+        self._end_food(cell)
+
+    def _end_food(self, cell: Cell) -> None:
+        """Let a cell have no food now and later."""
+        self._foods.pop(cell, None)
         self.colony.food_sources.end(cell)
 
     def _add(self, cells: Sequence[Cell], nests: Sequence[int], heading: int | None) -> None:
@@ -217,24 +217,19 @@ class Interventions:
 
     def _begin_episode(self) -> None:
         """End the episode, and start the next one in the world as interventions have changed it."""
-        colony, first, later = self.colony, self._first, self._later
+        colony, first = self.colony, self._first
         colony.end_episode()
         colony.n_ants = self.ants
         for number in range(len(colony.streams), self.ants):
-            state = stream_state(colony.seed, STREAM_ANT, number)
-            colony.streams.append(RandomStream(state))
-        held = {
-            content: [(cell, number) for cell, (what, number) in later.items() if what == content]
-            for content in (QUEEN, FOOD, OBSTACLE)
-        }
-        queens = [cell for cell, _ in sorted(held[QUEEN], key=lambda queen: queen[1])]
-        rocks = [cell for cell, _ in held[OBSTACLE]]
+            colony.streams.append(RandomStream(stream_state(colony.seed, STREAM_ANT, number)))
+        queens = colony.world.queens
+        rocks = [cell for cell, what in colony.world.ground.items() if what == OBSTACLE]
         trails = [(tuple(row[:3]), row[3]) for row in first.trails.tolist()]
         trails = [(cell, level) for cell, level in trails if cell not in rocks]
         ants = [(tuple(row[:3]), row[3]) for row in first.ants.tolist()]
-        ants = [(cell, heading) for cell, heading in ants if later.get(cell, (EMPTY,))[0] == EMPTY]
-        world = World(
-            *(first.ranges, queens, held[FOOD], rocks, trails, ants), regions=first.regions
+        ants = [row for row in ants if row[0] not in {*queens, *rocks, *self._foods}]
+        foods = [*self._foods.items()]
+        colony.begin_episode(
+            World(first.ranges, queens, foods, rocks, trails, ants, regions=first.regions)
         )
-        colony.begin_episode(world)
         self._set_stream()

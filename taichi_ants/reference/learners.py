@@ -119,20 +119,15 @@ class DynaQ(QLearning):
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
         error = super().learn(step, epsilon, stream)
-        self.remember(step)
+        self.model[step.pair] = step
         for _ in range(int(self.settings["planning_steps"])):
             seen = self.draw_seen(stream)
             self.update(seen.pair, self.learning_rate, self.error(seen, epsilon))
         return error
 
-    def remember(self, step: Transition) -> None:
-        """Store a transition, which replaces the previous one of its pair."""
-        self.model[step.pair] = step
-
     def draw_seen(self, stream: RandomStream) -> Transition:
         """Return a random transition of the model."""
-        high, _ = stream.draw()
-        return list(self.model.values())[pick(high, len(self.model))]
+        return list(self.model.values())[pick(stream.draw()[0], len(self.model))]
 
 
 class DoubleQ(ReferenceLearner):
@@ -145,18 +140,16 @@ class DoubleQ(ReferenceLearner):
         self._tables = [[list(row) for row in self.rows] for _ in "AB"]
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
-        high, _ = stream.draw()
-        chosen = pick(high, 2)
+        chosen = pick(stream.draw()[0], 2)
         updated, other = self._tables[chosen], self._tables[1 - chosen]
         next_values = updated[step.next_state]
-        best = next_values.index(max(next_values))
-        next_value = other[step.next_state][best]
+        next_value = other[step.next_state][next_values.index(max(next_values))]
         target = np.float32(step.reward) + self.discount_of(step) * next_value
         state, action = step.pair
         error = target - updated[state][action]
         updated[state][action] = updated[state][action] + self.learning_rate * error
-        a, b = self._tables
-        self.rows[state][action] = (a[state][action] + b[state][action]) * np.float32(0.5)
+        both = updated[state][action] + other[state][action]
+        self.rows[state][action] = both * np.float32(0.5)
         return error
 
 
@@ -218,7 +211,7 @@ class PrioritizedSweeping(DynaQ):
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
         error = self.error(step, epsilon)
-        self.remember(step)
+        self.model[step.pair] = step
         self._priorities.setdefault(step.pair, np.float32(0))
         if self._matters(error):
             self._priorities[step.pair] = abs(error)
@@ -275,7 +268,7 @@ def learn_together(
     if isinstance(learner, DynaQ):
         # If several ants have the same pair, the model keeps that of the highest number.
         for step in sorted(steps, key=lambda step: (step.pair, step.number)):
-            learner.remember(step)
+            learner.model[step.pair] = step
         for _ in range(int(learner.settings["planning_steps"])):
             _update(learner, [learner.draw_seen(stream) for stream in streams], epsilon, weights)
 

@@ -17,12 +17,6 @@ from taichi_ants.task.events import Event
 NONE = math.nan
 
 
-def first_delivery(colony: ReferenceColony) -> float:
-    """Return the ticks up to the first delivery, or the ticks so far."""
-    record = colony.record
-    return record.ticks if record.first_delivery == -1 else record.first_delivery
-
-
 def ratio(part: float, whole: float) -> float:
     """Return a share; nan of nothing."""
     return part / whole if whole else NONE
@@ -78,25 +72,15 @@ def mean_of_ants(
     return mean
 
 
-def steps_to_queen(colony: ReferenceColony, ant: Ant) -> int:
-    """Return the distance of an ant to the nearest queen."""
-    return min(distance(ant.cell, queen) for queen in colony.world.queens)
-
-
-def deliveries_by(colony: ReferenceColony, part: str) -> int:
-    """Return the deliveries of a nest, a kind of food or a caste, such as "nest_0"."""
-    owner, _, number = part.partition("_")
-    if owner == "caste":
-        return colony.record.by_caste[int(number)]
-    column = ("nest", "food").index(owner)
-    return sum(n for key, n in colony.record.delivered.items() if key[column] == int(number))
-
-
 def measured(colony: ReferenceColony, name: str) -> float:
     """Return the value of a measure of `MEASURES`, or of a part of "regions" or "deliveries_by"."""
     before, _, part = name.partition(".")
     if before == "deliveries_by":
-        return deliveries_by(colony, part)
+        owner, _, number = part.partition("_")
+        if owner == "caste":
+            return colony.record.by_caste[int(number)]
+        column, of_pairs = ("nest", "food").index(owner), colony.record.delivered.items()
+        return sum(n for key, n in of_pairs if key[column] == int(number))
     if before == "regions":
         cells = listed_cells(colony.start_world.regions[part])
         return mean_of_ants(lambda _, ant: ant.cell in cells)(colony)
@@ -105,7 +89,9 @@ def measured(colony: ReferenceColony, name: str) -> float:
 
 MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
     "deliveries": lambda colony: colony.record.deliveries,
-    "first_delivery": first_delivery,
+    "first_delivery": lambda colony: (  # the ticks so far if there is none
+        colony.record.ticks if colony.record.first_delivery < 0 else colony.record.first_delivery
+    ),
     "efficiency": lambda colony: ratio(
         colony.record.deliveries, colony.record.ticks * len(colony.ants)
     ),
@@ -117,23 +103,15 @@ MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
     "activity": mean_of_ants(lambda _, ant: ant.event in (Event.ENTERED_EMPTY, Event.ENTERED_CUE)),
     "living": lambda colony: len(colony.ants),
     "carriers": mean_of_ants(lambda _, ant: ant.carries),
-    "distance": mean_of_ants(steps_to_queen),
+    "distance": mean_of_ants(
+        lambda colony, ant: min(distance(ant.cell, queen) for queen in colony.world.queens)
+    ),
     **{
         name: mean_of_ants(of_ant)
         for twin in TWINS.values()
         for name, of_ant in getattr(twin, "MEASURES", {}).items()
     },
 }
-
-
-def occupancy(colony: ReferenceColony) -> dict[Cell, int]:
-    """Return the number of ants on each cell with ants."""
-    return dict(Counter(ant.cell for ant in colony.ants.values()))
-
-
-def new_deliveries(rows: Sequence[float]) -> float:
-    """Return the growth of the deliveries since the last row."""
-    return rows[-1] - (rows[-2] if len(rows) > 1 else 0)
 
 
 def synchrony(rows: Sequence[float], ants: int) -> float:

@@ -8,14 +8,7 @@ from functools import partial
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, distance, neighbour
 from taichi_ants.reference.world_state import Level, Trail, WorldState
-from taichi_ants.task.constants import (
-    EMPTY,
-    FOOD,
-    SEES_CUE,
-    SEES_EMPTY,
-    SEES_GOAL,
-    SEES_OBSTACLE,
-)
+from taichi_ants.task.constants import EMPTY, FOOD, SEES_CUE, SEES_EMPTY, SEES_GOAL, SEES_OBSTACLE
 
 AHEAD = (-1, 0, 1)  # headings relative to the ant's: left, forward, right
 # From back left to back right; the sixth cell is the one behind.
@@ -95,8 +88,7 @@ def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
 
 def observe(world: WorldState, ant: Ant) -> int:
     """Return the paper's state: load, left, forward and right as a number, 0..127."""
-    left, forward, right = codes_in_view(world, ant)
-    return 64 * ant.carries + 16 * left + 4 * forward + right
+    return _number([ant.carries, *codes_in_view(world, ant)], 4)
 
 
 def codes_seen(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
@@ -105,11 +97,11 @@ def codes_seen(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> l
     return [ant.misread.get(turn, code) for turn, code in zip(turns, codes, strict=True)]
 
 
-def ants_in_view(world: WorldState, ant: Ant) -> list[Ant | None]:
-    """Return the nestmate that the ant sees on each cell ahead, but not on cells it misreads."""
+def ants_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Ant | None]:
+    """Return the nestmate that the ant sees on each cell, but not on cells it misreads."""
     return [
         None if turn in ant.misread else nestmate(world, ant, cell)
-        for turn, cell in zip(AHEAD, cells_in_view(ant), strict=True)
+        for turn, cell in zip(turns, cells_in_view(ant, turns), strict=True)
     ]
 
 
@@ -131,8 +123,7 @@ def trail_levels(world: WorldState, ant: Ant) -> int:
     """Return the state index of load and cells ahead; trails have three codes, by strength."""
     strongest = strongest_in_view(world, ant)
     codes = []
-    views = zip(AHEAD, codes_seen(world, ant), cells_in_view(ant), strict=True)
-    for turn, code, cell in views:
+    for turn, code, cell in zip(AHEAD, codes_seen(world, ant), cells_in_view(ant), strict=True):
         if code == SEES_GOAL:
             codes.append(GOAL)
         elif code == SEES_OBSTACLE:

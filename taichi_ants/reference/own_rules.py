@@ -2,44 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Container
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants.errors import check_one_of
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.features import inputs_of
 from taichi_ants.reference.geometry import distance
 from taichi_ants.reference.observations import (
     AHEAD,
-    OBSERVATIONS,
+    ants_in_view,
     cells_in_view,
     codes_seen,
     is_better,
     levels_in_view,
+    more_cells,
     nestmate,
     strongest_in_view,
 )
-from taichi_ants.reference.world_state import Trail, WorldState
+from taichi_ants.reference.random_stream import WORDS
+from taichi_ants.reference.world_state import Trail, WorldState, computed
 from taichi_ants.rules.inputs import Vector
 from taichi_ants.task.constants import SEES_CUE, SEES_EMPTY
 
 if TYPE_CHECKING:
     from taichi_ants.rules import Rule
     from taichi_ants.task import Observation, Task
-
-_WORDS = 4294967296.0
-
-
-def computed(rule: Rule, task: Task, inputs: Mapping[str, Any]) -> float:
-    """Return the result of a rule; `inputs` are all that rules of its kind can read."""
-    numbers = {
-        name: Vector(map(float, value)) if isinstance(value, list) else float(value)
-        for name, value in ((name, inputs[name]) for name in rule.inputs)
-    }
-    return rule.result(numbers, vars(task.rules[rule.name]))
 
 
 def choose_by_rule(
@@ -58,28 +48,18 @@ def choose_by_rule(
             nearer[side] = world.has_compass(ant) and is_better(world, ant, cell)
             if task.traffic.shared and nestmate(world, ant, cell):
                 is_open[side] = ant.carries or task.traffic.follow
-    inputs = {
-        "values": list(values),
-        "codes": codes,
-        "is_open": is_open,
-        "nearer": nearer,
-        "paper_state": seen,
-        "epsilon": int(epsilon * _WORDS) / _WORDS,
-        "random": low / _WORDS,
-        "random_2": high / _WORDS,
-    }
-    return int(computed(rule, task, {**inputs, **_of_ant(world, ant, task, tick, ant.misread)}))
+    inputs: dict[str, Any] = {"values": list(values), "codes": codes, "is_open": is_open}
+    inputs |= {"nearer": nearer, "paper_state": seen, "epsilon": int(epsilon * WORDS) / WORDS}
+    inputs |= {"random": low / WORDS, "random_2": high / WORDS}
+    inputs |= _of_ant(world, ant, task, tick, ant.misread)
+    return int(computed(rule, task.rules, inputs))
 
 
 def pay(world: WorldState, was: Ant, ant: Ant, rule: Rule, task: Task, tick: int) -> int:
     """Return the reward of an ant by your rule, after the tick; `was` is the ant before it."""
-    inputs = {
-        "reward": ant.reward,
-        "event": ant.event,
-        "paper_state": was.paper_state,
-        "next_paper_state": ant.paper_state,
-    }
-    return int(computed(rule, task, {**inputs, **_of_ant(world, ant, task, tick, ())}))
+    inputs = {"paper_state": was.paper_state, "next_paper_state": ant.paper_state}
+    inputs |= {"reward": ant.reward, "event": ant.event, **_of_ant(world, ant, task, tick, ())}
+    return int(computed(rule, task.rules, inputs))
 
 
 def _of_ant(
@@ -93,16 +73,6 @@ def _of_ant(
         inputs[f"levels{name}"] = levels_in_view(world, ant, trail, AHEAD, hidden)
         inputs[f"level{name}"] = trail.level(ant.cell)
     return inputs
-
-
-def state_by(observation: Observation) -> Callable[[WorldState, Ant], int]:
-    """Return a function of a world and an ant that returns the ant's state index.
-
-    AntsError for an observation of the package, which must have a function in `OBSERVATIONS`.
-    """
-    if observation.encode.__module__.startswith("taichi_ants."):
-        check_one_of("observation", observation.name, tuple(OBSERVATIONS))
-    return lambda world, ant: int(observation.encode(view_of(world, ant, observation)))
 
 
 def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleNamespace:
@@ -129,22 +99,16 @@ def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleName
         nearer = [distance(cell, queen) < far for cell in cells]
     else:
         nearer = [bool(level > own_level) for level in ahead]
-    others = [
-        world.ants.get(cell) if seen else None for cell, seen in zip(cells, is_seen, strict=True)
-    ]
-    codes = codes_seen(world, ant, turns)
-    left, forward, right = (codes[turns.index(turn)] for turn in (-1, 0, 1))
+    nestmates = ants_in_view(world, ant, turns)
     view: dict[str, Any] = {
         "carries": int(ant.carries),
-        "paper_state": 64 * ant.carries + 16 * left + 4 * forward + right,
-        "codes": Vector(codes),
+        "paper_state": more_cells(AHEAD, world, ant),
+        "codes": Vector(codes_seen(world, ant, turns)),
         "levels": ahead,
-        "ants": Vector(
-            1 + other.carries if other is not None and other.nest == ant.nest else 0
-            for other in others
-        ),
+        "ants": Vector(0 if other is None else 1 + other.carries for other in nestmates),
         "other_nest_ants": Vector(
-            int(other is not None and other.nest != ant.nest) for other in others
+            int(seen and cell in world.ants and nestmate(world, ant, cell) is None)
+            for cell, seen in zip(cells, is_seen, strict=True)
         ),
         "nearer": Vector(
             int(is_nearer and seen) for is_nearer, seen in zip(nearer, is_seen, strict=True)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 _MASK_64 = 0xFFFFFFFFFFFFFFFF
 _MASK_32 = 0xFFFFFFFF
 _GAMMA = 0x9E3779B97F4A7C15
+WORDS = 4294967296.0  # random 32-bit words
 
 
 def _mix(z: int) -> int:

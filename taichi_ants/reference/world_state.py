@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from taichi_ants.reference.geometry import (
     neighbour,
     queens_of,
 )
+from taichi_ants.rules.inputs import Vector
 from taichi_ants.task import Caste
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
@@ -28,6 +30,15 @@ if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
 
 Level = int | np.integer | np.float32
+
+
+def computed(rule: Rule, rules: Mapping[str, Parameters], facts: Mapping[str, Any]) -> float:
+    """Return the result of your own rule from what rules of its kind can read."""
+    inputs = {
+        name: Vector(map(float, value)) if isinstance(value, list) else float(value)
+        for name, value in ((name, facts[name]) for name in rule.inputs)
+    }
+    return rule.result(inputs, vars(rules[rule.name]))
 
 
 class Trail:
@@ -75,13 +86,11 @@ class Trail:
         """
         rule, level = self.rule, self._levels[cell]
         if rule.own_deposit is not None:
-            facts: dict[str, Any] = {
-                f"level_{name}": trail.level(cell) for name, trail in others.items()
-            }
-            for name in ("carried", "carries", "event", "paper_state", "trait"):
-                facts[name] = getattr(ant, name)
+            names = ("carried", "carries", "event", "paper_state", "trait")
+            facts = {name: getattr(ant, name) for name in names}
+            facts |= {f"level_{name}": trail.level(cell) for name, trail in others.items()}
             facts |= {"level": level, "tick": tick, **inputs}
-            level = self._computed(rule.own_deposit, facts)
+            level = computed(rule.own_deposit, self._rules, facts)
             level = level if rule.dense else math.floor(level)
         elif rule.deposit == "set":
             level = rule.level
@@ -91,17 +100,12 @@ class Trail:
             level = max(level, rule.level - int(rule.slope or 0) * ant.carried)
         self.lay(cell, level)
 
-    def _computed(self, rule: Rule, facts: Mapping[str, Any]) -> float:
-        """Return the result of your own rule for a cell."""
-        inputs = {name: float(facts[name]) for name in rule.inputs}
-        return rule.result(inputs, vars(self._rules[rule.name]))
-
     def tick(self, tick: int = 0) -> None:
         """Let trails evaporate, then spread, for one tick."""
         rule, evaporation = self.rule, self.rule.own_evaporation
         for cell, level in self._levels.items():
             if evaporation is not None:
-                level = self._computed(evaporation, {"level": level, "tick": tick})
+                level = computed(evaporation, self._rules, {"level": level, "tick": tick})
             elif rule.evaporation == "linear":
                 level = max(level - 1, 0)
             elif rule.evaporation == "exponential":
@@ -127,13 +131,13 @@ class WorldState:
         pheromones: The trail and the further fields, by name.
         cues: The names of the outbound and the homing cue, by caste.
         foods: The kinds of food of the task; none for the usual food.
-        of_nests: The values of the features of the model by name, for each nest.
+        of_nests: The values of the features of the model by name, at first 0, for each nest.
     """
 
     def __init__(self, world: World, task: Task, learns: bool = False) -> None:
         self._ranges = world.ranges
         self.queens: list[Cell] = queens_of(world)
-        self.of_nests: list[dict[str, Any]] = [{} for _ in self.queens]
+        self.of_nests: list[dict[str, Any]] = [defaultdict(float) for _ in self.queens]
         self.ants: dict[Cell, Ant] = {}
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(world.ranges), EMPTY)
         self.ground |= dict.fromkeys(self.queens, QUEEN)

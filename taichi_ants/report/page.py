@@ -48,11 +48,11 @@ def fill(template: Path, **parts: Any) -> str:
     script = "\n".join([*map(part, _PLAYING), part("report.js", _HERE)])
     shared = {"style": style, "script": script}
     shared["policy"] = content_policy(f"\n{script}\n", f"\n{style}\n")
-    marked = {name: Markup(text) for name, text in shared.items()}
+    parts |= {name: Markup(text) for name, text in shared.items()}
     page = Environment(loader=PackageLoader("taichi_ants", "report"), **how).from_string(
         template.read_text(encoding="utf-8")
     )
-    return page.render(**marked, **parts)
+    return page.render(**parts)
 
 
 class Player(NamedTuple):
@@ -163,11 +163,10 @@ def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
     for tick in sorted(ends, key=lambda edge: (edge != 0, edge)):
         if all(abs(at(tick) - at(other)) > _SIDE for other in labelled):
             labelled.append(tick)
-            signed = figure(tick).replace("-", "\N{MINUS SIGN}")
-            parts.append(text(signed, at(tick), _NUMBERS))
+            parts.append(text(figure(tick).replace("-", "\N{MINUS SIGN}"), at(tick), _NUMBERS))
     lines = wrap(axis, _LETTERS)
-    below = enumerate(lines, start=1)
-    parts += [text(line, WIDTH / 2, _NUMBERS + _LINE * number) for number, line in below]
+    for n, line in enumerate(lines, start=1):
+        parts.append(text(line, WIDTH / 2, _NUMBERS + _LINE * n))
     height = _NUMBERS + _LINE * len(lines) + 5.0
     size = f'viewBox="0 0 {WIDTH:g} {height:g}" width="{WIDTH:g}" height="{height:g}"'
     return f'<svg class="interval" {size} aria-hidden="true">{"".join(parts)}</svg>'

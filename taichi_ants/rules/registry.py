@@ -46,10 +46,8 @@ def register(
                 "choose another name."
             )
         inputs, settings = _arguments(called, kind, function)
-        lengths = {
-            argument: inputs[argument].length if argument in inputs else 0
-            for argument in inspect.signature(function).parameters
-        }
+        arguments = inspect.signature(function).parameters
+        lengths = {name: inputs[name].length if name in inputs else 0 for name in arguments}
         rule = Rule(called, kind, function, inputs, settings, "")
         try:
             rule = replace(rule, source=kernel_source(function, lengths))

@@ -296,7 +296,8 @@ class ColonyPoint:
     @property
     def runs_of_a_block(self) -> int:
         """The number of seeds of a block, whose colonies run together, as memory allows."""
-        if any(isinstance(event, When) and event.in_all_worlds for event in self.protocol):
+        conditions = [event for event in self.protocol if isinstance(event, When)]
+        if any(one.in_all_worlds for event in conditions for one in event.interventions):
             return 1  # a condition of one world must not change what all share
         slots, states = self.capacity or self.ants, self.task.n_states
         memory = learners.get(self.training.learner).memory_for(self.training, states)

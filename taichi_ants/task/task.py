@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal
 
 from taichi_ants.errors import shown
-from taichi_ants.features import FEATURES, feature_of_input, probabilities, used_by
+from taichi_ants.features import FEATURES, probabilities, used_by
 from taichi_ants.features.castes import ALL, NOTHING, Caste, shares_in
 from taichi_ants.features.labour import Labour
 from taichi_ants.features.life import Life
@@ -248,7 +248,7 @@ class Task(Settings, path="task"):
                     "leave them out, or name the rule, for example in `task.choice.rule`."
                 )
             for read in rules[name].inputs if name in rules else ():
-                owner = feature_of_input(read)
+                owner = next((one for one in FEATURES if read in one.inputs), None)
                 if owner is not None and not owner.is_used(self):
                     example = owner.example[owner.group]
                     yield (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from random_colonies import random_colony
@@ -9,7 +11,7 @@ from random_colonies import random_colony
 from taichi_ants import Colony, TrainingConfig, measures, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.measures import MEASURES, measured, new_deliveries, occupancy, synchrony
+from taichi_ants.reference.measures import MEASURES, measured, synchrony
 from taichi_ants.task import foraging
 
 EVERY, EPISODES, TICKS = 3, 2, 20
@@ -36,8 +38,9 @@ def expected(plain: ReferenceColony) -> list[dict]:
             active.append(row["activity"])
             delivered.append(row["deliveries"])
             row["synchrony"] = synchrony(active, len(plain.ants))
-            row["new_deliveries"] = new_deliveries(delivered)
-            rows.append({**row, "episode": episode, "tick": tick, "occupancy": occupancy(plain)})
+            row["new_deliveries"] = delivered[-1] - (delivered[-2] if len(delivered) > 1 else 0)
+            on_cells = dict(Counter(ant.cell for ant in plain.ants.values()))
+            rows.append({**row, "episode": episode, "tick": tick, "occupancy": on_cells})
         plain.end_episode()
     return rows
 

@@ -311,7 +311,7 @@ def test_an_observation_is_compared_with_the_reference(monkeypatch):
     observations.register(Observation("homely", 256, homely, reads=("B", "trail")))
     check = check_observation("homely")
     assert str(check) == "homely (reads the fields B and trail): 120 ticks of 2 colonies: equal"
-    monkeypatch.setattr(own_rules, "codes_seen", lambda *_: [0, 0, 0])
+    monkeypatch.setattr(own_rules, "more_cells", lambda *_: 0)
     check = check_observation("homely")
     assert check.ticks < 120
     assert check.difference.startswith("seed 0, tick ")

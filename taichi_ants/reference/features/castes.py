@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import STREAM_INDIVIDUAL
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.random_stream import RandomStream, stream_state
+from taichi_ants.reference.random_stream import WORDS, RandomStream, stream_state
 from taichi_ants.task import Caste
 
 if TYPE_CHECKING:
     from taichi_ants.task import Task
-
-_WORDS = 4294967296.0
 
 
 def caste_of(task: Task, ant: Ant) -> Caste:
@@ -65,7 +63,7 @@ def draw_caste(castes: Sequence[Caste], nest: int, n: int, stream: RandomStream)
     cumulative = 0.0
     for caste, (fixed, share) in enumerate(parts[:-1]):
         cumulative += fixed / max(n, 1) + share * rest
-        if cumulative > high / _WORDS:
+        if cumulative > high / WORDS:
             return caste
     return len(castes) - 1
 
@@ -73,7 +71,7 @@ def draw_caste(castes: Sequence[Caste], nest: int, n: int, stream: RandomStream)
 def draw_trait(seed: int, number: int) -> float:
     """Return the trait of the ant with a number, from 0 to less than 1."""
     high, _ = RandomStream(stream_state(seed, STREAM_INDIVIDUAL, number)).draw()
-    return high / _WORDS
+    return high / WORDS
 
 
 def epsilon_of(caste: Caste, ant: Ant, default: float) -> float:

@@ -6,22 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants.grid.constants import N_HEADINGS, STREAM_TRAIT
+from taichi_ants.grid.constants import STREAM_TRAIT
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.features.castes import caste_of
-from taichi_ants.reference.geometry import neighbour
-from taichi_ants.reference.random_stream import RandomStream, stream_state
+from taichi_ants.reference.geometry import distance
+from taichi_ants.reference.random_stream import WORDS, RandomStream, stream_state
 from taichi_ants.rules.functions import exp, log, power
 
 if TYPE_CHECKING:
     from taichi_ants.reference.world_state import WorldState
     from taichi_ants.task import Threshold
 
-ReferenceColony = Any  # which imports this file
-_WORDS = 4294967296.0
 
-
-def born(colony: ReferenceColony, ant: Ant) -> None:
+def born(colony: Any, ant: Ant) -> None:
     """Draw the threshold of an ant, which is idle if it has one."""
     threshold = caste_of(colony.task, ant).threshold
     ant.own["threshold"] = draw_threshold(threshold, colony.seed, ant.number)
@@ -39,7 +36,7 @@ def draw_threshold(threshold: Threshold, seed: int, number: int) -> np.float32:
         return np.float32(value)
     if threshold.distribution == "uniform":
         high, _ = stream.draw()
-        return np.float32(value + spread * (2.0 * ((high + 0.5) / _WORDS) - 1.0))
+        return np.float32(value + spread * (2.0 * ((high + 0.5) / WORDS) - 1.0))
     while True:
         high, low = stream.draw()
         a, b = ((word + 0.5) / 2147483648.0 - 1.0 for word in (high, low))
@@ -53,64 +50,50 @@ def draw_threshold(threshold: Threshold, seed: int, number: int) -> np.float32:
             return np.float32(value + spread * z)
 
 
-def choose(colony: ReferenceColony, ant: Ant) -> bool:
+def choose(colony: Any, ant: Ant) -> bool:
     """Let an idle ant start to forage, by a draw; return whether it stays idle."""
-    if ant.own["idle"]:
-        ant.own["idle"] = not _starts_foraging(colony, ant)
+    if not ant.own["idle"]:
+        return False
+    stimulus = colony.world.of_nests[ant.nest]["stimulus"]
+    high, _ = ant.stream.draw()
+    if stimulus > 0.0:
+        ratio = float(ant.own["threshold"]) / stimulus
+        raised = power(ratio, colony.task.labour.exponent) if ratio > 0.0 else 0.0
+        ant.own["idle"] = high >= int(1.0 / (1.0 + raised) * WORDS)
     return ant.own["idle"]
 
 
-def _starts_foraging(colony: ReferenceColony, ant: Ant) -> bool:
-    exponent, stimulus = colony.task.labour.exponent, _stimulus(colony.world, ant)
-    assert exponent is not None
-    high, _ = ant.stream.draw()
-    if stimulus <= 0.0:
-        return False
-    ratio = float(ant.own["threshold"]) / stimulus
-    raised = power(ratio, exponent) if ratio > 0.0 else 0.0
-    return high < int(1.0 / (1.0 + raised) * _WORDS)
-
-
-def delivered(colony: ReferenceColony, nest: int, n: int) -> None:
+def delivered(colony: Any, nest: int, n: int) -> None:
     """Lower the stimulus of a nest."""
     values, relief = colony.world.of_nests[nest], (colony.task.labour.relief or 0.0) * n
-    values["stimulus"] = max(0.0, values.get("stimulus", 0.0) - relief)
+    values["stimulus"] = max(0.0, values["stimulus"] - relief)
 
 
-def acted(colony: ReferenceColony, ant: Ant) -> bool:
+def acted(colony: Any, ant: Ant) -> bool:
     """Return whether a forager becomes idle, by a draw if it can."""
     caste, chance = caste_of(colony.task, ant), colony.task.labour.stop_probability
     queen = colony.world.queens[ant.nest]
-    at_nest = queen in [neighbour(ant.cell, heading) for heading in range(N_HEADINGS)]
-    if not chance or caste.threshold.distribution == "none" or ant.carries or not at_nest:
+    can_stop = chance and caste.threshold.distribution != "none" and not ant.carries
+    if not can_stop or distance(ant.cell, queen) != 1:
         return False
     high, _ = ant.stream.draw()
-    return high < int(chance * _WORDS)
+    return high < int(chance * WORDS)
 
 
-def stopped(colony: ReferenceColony, ant: Ant) -> None:
+def stopped(colony: Any, ant: Ant) -> None:
     """Make an ant idle."""
     ant.own["idle"] = True
 
 
-def tick_ended(colony: ReferenceColony, nest: int) -> None:
+def tick_ended(colony: Any, nest: int) -> None:
     """Raise the stimulus of a nest."""
-    values = colony.world.of_nests[nest]
-    values["stimulus"] = values.get("stimulus", 0.0) + (colony.task.labour.demand or 0.0)
+    colony.world.of_nests[nest]["stimulus"] += colony.task.labour.demand or 0.0
 
 
 def inputs(world: WorldState, ant: Ant) -> dict[str, Any]:
     """Return the inputs of your rules: the threshold of an ant, and the stimulus of its nest."""
-    return {"threshold": ant.own["threshold"], "stimulus": _stimulus(world, ant)}
+    stimulus = world.of_nests[ant.nest]["stimulus"]
+    return {"threshold": ant.own["threshold"], "stimulus": stimulus}
 
 
-def _stimulus(world: WorldState, ant: Ant) -> float:
-    return world.of_nests[ant.nest].get("stimulus", 0.0)
-
-
-def foraging(colony: ReferenceColony, ant: Ant) -> bool:
-    """Return whether an ant forages, so that it is not idle."""
-    return not ant.own.get("idle", False)
-
-
-MEASURES = {"foraging": foraging}  # shares of ants
+MEASURES = {"foraging": lambda colony, ant: not ant.own.get("idle", False)}  # shares of ants

@@ -7,15 +7,13 @@ from typing import Any
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.features.castes import caste_of
 
-ReferenceColony = Any  # which imports this file
 
-
-def born(colony: ReferenceColony, ant: Ant) -> None:
+def born(colony: Any, ant: Ant) -> None:
     """Let an ant begin at age 0."""
     ant.own["age"] = 0
 
 
-def aged(colony: ReferenceColony, ant: Ant) -> bool:
+def aged(colony: Any, ant: Ant) -> bool:
     """Let an ant grow old, if ants die; return whether it reaches its lifespan."""
     lifespan = caste_of(colony.task, ant).lifespan or colony.task.life.lifespan
     if lifespan is None:

@@ -5,25 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.random_stream import pick
+from taichi_ants.reference.random_stream import WORDS, pick
 from taichi_ants.task.constants import N_ACTIONS
 
-ReferenceColony = Any  # which imports this file
-_WORDS = 4294967296.0
 
-
-def execute(colony: ReferenceColony, ant: Ant, action: int) -> int:
+def execute(colony: Any, ant: Ant, action: int) -> int:
     """Return the action that an ant executes instead of the one it chose."""
     if (slip := colony.task.noise.slip) == 0:
         return action
     high, low = ant.stream.draw()
-    return pick(low, N_ACTIONS) if high < int(slip * _WORDS) else action
+    return pick(low, N_ACTIONS) if high < int(slip * WORDS) else action
 
 
-def see(colony: ReferenceColony, ant: Ant, code: int) -> int:
+def see(colony: Any, ant: Ant, code: int) -> int:
     """Return the code that an ant sees instead of the true one."""
     if (misread := colony.task.noise.misread) == 0:
         return code
     high, low = ant.stream.draw()
     others = [other for other in range(4) if other != code]
-    return others[pick(low, 3)] if high < int(misread * _WORDS) else code
+    return others[pick(low, 3)] if high < int(misread * WORDS) else code
