@@ -84,11 +84,10 @@ def _of_rules(rules: Mapping[str, Parameters]) -> dict[str, Value]:
     for name, parameters in rules.items():
         for setting in declared(type(parameters)):
             value, rule = getattr(parameters, setting.name), setting.rule
-            # Where no bound is declared, there is room around the default.
-            usual = max(1, 2 * abs(setting.default))
+            # A bound that is not declared leaves room on the side of the default.
             low = rule.above if rule.least is None else rule.least
-            least = min(value, -usual) if low is None else low
-            most = max(value, usual, least + 1) if rule.most is None else rule.most
+            least = min(value, 0, 2 * setting.default) if low is None else low
+            most = max(value, 2 * setting.default, least + 1) if rule.most is None else rule.most
             step = 1 if setting.kind is int else 10.0 ** math.floor(math.log10(most - least) - 2)
             least += step * (rule.least is None and rule.above is not None)
             help = f"{rule.help} of the rule {name}, by default {setting.default:g}"

@@ -41,7 +41,7 @@ class Panel {
   constructor(history, stage, choose, signal) {
     this.history = history;
     this.stage = stage;
-    this.choose = choose; // {follow(number), unfollow(), cell(cell), other(step), aim()}
+    this.choose = choose; // {follow(number), unfollow(), cell(cell), other(step), aim(), pheromone(number)}
     byId("about").innerHTML = history.header.about
       .map(([name, value]) => `<dt>${safe(name)}</dt><dd>${safe(value)}</dd>`).join("");
     document.querySelector(".panel").addEventListener("click", (event) => {
@@ -54,6 +54,7 @@ class Panel {
       if (pressed === "ant-close") choose.unfollow();
       if (pressed === "cell-close") choose.cell(-1);
     }, { signal });
+    byId("legend").addEventListener("change", ({ target }) => choose.pheromone(target.selectedIndex), { signal });
   }
 
   show(moment, followed, cell, aims) {

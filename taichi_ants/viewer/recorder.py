@@ -56,7 +56,8 @@ class Recorder:
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         self.grid, self._n_states = colony.snapshot(world).grid, colony.task.n_states
         self._learns, owners = colony.sharing != "frozen", colony.owners
-        self.types = types_of(self.grid.size, self._n_states, *(one.dense for one in colony.pheromones))
+        dense = (one.dense for one in colony.pheromones)
+        self.types = types_of(self.grid.size, self._n_states, *dense)
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables that were sent
         self._owners = np.full(owners, -1) if colony.one_a_slot else np.arange(owners)
         # For curves: the first episode, the ticks until the last end that was noted, its episode.

@@ -59,7 +59,7 @@ SETUPS = {
     ),
     "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="independent"),
     "nests": Setup(TWO_NESTS, tasks.foraging(), LEARNS, 20, 40, 3, 25),
-    "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL, pheromone="home"),
+    "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL),
 }
 LATER = ("queueing", "lively")
 MARKED = [pytest.param(one, marks=[pytest.mark.slow] * (one in LATER)) for one in SETUPS]
