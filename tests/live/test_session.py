@@ -6,6 +6,7 @@ import contextlib
 import functools
 import json
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from taichi_ants import (
     TrainingConfig,
     World,
     load_policy,
+    rules,
 )
 from taichi_ants import task as tasks
 from taichi_ants.files import archives
@@ -28,6 +30,7 @@ from taichi_ants.learners.policies import trail_follower
 from taichi_ants.live import session as session_module
 from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
+from taichi_ants.settings import Setting
 from taichi_ants.viewer import Recording
 from taichi_ants.viewer.frames import CLOCK, POINT
 from taichi_ants.worlds import text_map
@@ -43,6 +46,16 @@ HOMING = tasks.foraging().replace(
     fields={"home": {"deposited_when": "without_food", "evaporation": "exponential"}},
     homing_cue="home",
 )
+
+
+@rules.register("deposit")
+def live_bump(
+    level, most: Annotated[int, Setting("largest level", least=1, most=900)] = 400, share=0.5
+):
+    return min(level + most * share, most)
+
+
+OWN = HOMING.replace(pheromone={"deposit": "live_bump"})
 TWO_NESTS = text_map.to_text(
     World((7, 7, 7), [(0, 6, 0), (6, 0, 3)], [(0, 0, 5), (1, 0, 5), (5, 5, 0)], [(0, 3, 0)])
 )
@@ -59,6 +72,7 @@ SETUPS = {
     ),
     "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="independent"),
     "nests": Setup(TWO_NESTS, tasks.foraging(), LEARNS, 20, 40, 3, 25),
+    "rules": Setup("open", OWN, LEARNS, 20, world_settings=SMALL),
     "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL),
 }
 LATER = ("queueing", "lively")
@@ -262,6 +276,24 @@ WRONG = [
     ({"task": {"pheromone.half_life": 9}}, "half_life` is 9.0; leave"),
     ({"ants": 41}, "ants is 41"),
 ]
+
+
+def test_parameters_of_own_rules_have_values_that_change_while_ants_run():
+    session = Session(SETUPS["rules"])
+    values = session.values()
+    assert values["live_bump.most"] | {"help": ""} == {
+        **{"value": 400, "least": 1, "most": 900, "step": 1},
+        **{"path": "task.rules.live_bump.most", "edits": None, "help": ""},
+    }
+    assert "largest level" in values["live_bump.most"]["help"]
+    share = values["live_bump.share"]
+    assert share["least"] == 0 < share["value"] == 0.5 < share["most"]
+    session.apply({"task": {"rules.live_bump.most": 7}})
+    session.advance(30)
+    assert session.values()["live_bump.most"]["value"] == 7
+    assert session.colony.snapshot().trail.max() <= 7
+    assert session.colony.snapshot().fields["home"].max() > 7
+    assert "901" in refused(session, {"task": {"rules.live_bump.most": 901}})
 
 
 def refused(session: Session, edit: object) -> str:
