@@ -30,6 +30,7 @@ from taichi_ants.learners.policies import trail_follower
 from taichi_ants.live import session as session_module
 from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
+from taichi_ants.rules.rule import RULES
 from taichi_ants.settings import Setting
 from taichi_ants.viewer import Recording
 from taichi_ants.viewer.frames import CLOCK, POINT
@@ -75,8 +76,16 @@ SETUPS = {
     "rules": Setup("open", OWN, LEARNS, 20, world_settings=SMALL),
     "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL),
 }
+BUMP = RULES.yours.pop("live_bump")  # registered only while the tests of this file run
 LATER = ("queueing", "lively")
 MARKED = [pytest.param(one, marks=[pytest.mark.slow] * (one in LATER)) for one in SETUPS]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _registered():
+    RULES.add("live_bump", BUMP)
+    yield
+    RULES.yours.pop("live_bump")
 
 
 def with_edits(setup: Setup, n: int, seed: int = 0) -> Session:

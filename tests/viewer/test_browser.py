@@ -272,13 +272,13 @@ def test_the_legend_chooses_the_pheromone(browser, folder):
     assert all(np.array_equal(a, b) for a, b in zip(levels[-1], present.values(), strict=True))
     page = Page(browser, written(folder, "fields", recording))
     try:
-        page.focus("#shown")
+        page.tab.focus("#shown")
         for number in (1, 0):
-            page.keyboard.press("ArrowDown" if number else "ArrowUp")
+            page.press("ArrowDown" if number else "ArrowUp")
             for moment in (70, 3, 40):
-                shown = page.evaluate("(at) => [...viewer.history.worldAt(at).trail]", moment)
+                shown = page.read("(at) => [...viewer.history.worldAt(at).trail]", moment)
                 assert np.allclose(shown, levels[moment][number])
-            assert page.evaluate("viewer.history.pheromone.name") == ("trail", "home")[number]
+            assert page.read("viewer.history.pheromone.name") == ("trail", "home")[number]
     finally:
         page.close()
 
