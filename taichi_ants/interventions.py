@@ -20,12 +20,12 @@ import numpy as np
 
 from taichi_ants.errors import (
     AntsError,
+    as_array,
     check_one_of,
     count,
     entries_of,
     is_flag,
     refuse,
-    whole,
 )
 from taichi_ants.features import fixed_in
 from taichi_ants.grid.constants import N_HEADINGS
@@ -395,12 +395,7 @@ def flat_indices(grid: AxialGrid, cells: Sequence[Any]) -> list[int]:
 
 def _checked_cells(path: str, cells: Sequence) -> tuple:
     """Return cells as triples or flat indices; AntsError if one is neither."""
-    name, checked = f"a cell of `{path}`", []
-    for cell in cells:
-        parts = entries_of(cell)
-        if parts is not None and len(parts) != 3:
-            refuse(name, cell, "three whole numbers [x, y, z]")
-        checked.append(whole(name, cell) if parts is None else tuple(whole(name, x) for x in parts))
-    if not checked:
-        refuse(f"`{path}`", checked, "a list of at least one cell")
-    return tuple(checked)
+    rows = as_array(f"`{path}`", cells, "iu")
+    if not len(rows) or rows.shape[1:] not in ((), (3,)):
+        refuse(f"`{path}`", cells, "a list of cells, each three whole numbers [x, y, z]")
+    return tuple(rows.tolist() if rows.ndim == 1 else map(tuple, rows.tolist()))

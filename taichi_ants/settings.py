@@ -49,10 +49,7 @@ from taichi_ants.errors import AntsError, check_word, entries_of, is_flag, refus
 
 Self = TypeVar("Self", bound="Settings")
 Function = TypeVar("Function", bound=Callable[..., Any])
-_KINDS: dict[type, str] = {
-    **{bool: "True or False", int: "a whole number", float: "a number"},
-    list: "a list of numbers",
-}
+_KINDS: dict[type, str] = {bool: "True or False", int: "a whole number", float: "a number"}
 
 
 @dataclass(frozen=True)
@@ -116,11 +113,6 @@ class DeclaredSetting(NamedTuple):
         return issubclass(self.kind, Settings)
 
     @property
-    def is_text(self) -> bool:
-        """Whether the setting is a text of any words, such as the name of a field."""
-        return self.kind is str and not self.allowed_words
-
-    @property
     def has_names(self) -> bool:
         """Whether the setting is a class of settings with named values."""
         return self.is_group and bool(self.kind.named())  # type: ignore[attr-defined]
@@ -128,7 +120,20 @@ class DeclaredSetting(NamedTuple):
     @property
     def allowed(self) -> str:
         """The allowed values, in the words of messages and tables."""
-        return self._kind_in_words + (f" {self._range}" if self._range else "")
+        if self.kind is str:
+            words = ", ".join(self.allowed_words)
+            registered = ", or that of a plugin" if self.rule.choices else ""
+            return f"one of {words}{registered}" if words else "text"
+        if self.kind is Named:
+            return f"a table of names, each with a {self.entry.__name__}"
+        if self.is_group:
+            words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
+            form = self.kind.form or f"a {self.kind.__name__}"  # type: ignore[attr-defined]
+            return form + (f", or one of {words}" if words else "")
+        if self.kind is list:
+            one = self.rule.or_region
+            return "a list of cells, or the name of a region" if one else "a list of numbers"
+        return f"{_KINDS[self.kind]} {self._range}".rstrip()
 
     def about(self, value: Any) -> str:
         """Return the help of the command-line option whose default is `value`."""
@@ -213,22 +218,6 @@ class DeclaredSetting(NamedTuple):
     def allowed_words(self) -> tuple[str, ...]:
         """The allowed words; empty if any text is allowed."""
         return self.rule.choices() if self.rule.choices else self.words
-
-    @property
-    def _kind_in_words(self) -> str:
-        if self.kind is str:
-            words = ", ".join(self.allowed_words)
-            registered = ", or that of a plugin" if self.rule.choices else ""
-            return f"one of {words}{registered}" if words else "text"
-        if self.kind is Named:
-            return f"a table of names, each with a {self.entry.__name__}"
-        if self.is_group:
-            words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
-            form = self.kind.form or f"a {self.kind.__name__}"  # type: ignore[attr-defined]
-            return form + (f", or one of {words}" if words else "")
-        if self.rule.or_region:
-            return "a list of cells, or the name of a region"
-        return _KINDS[self.kind]
 
     @property
     def _range(self) -> str:

@@ -51,7 +51,7 @@ def wrong_values(one: DeclaredSetting) -> list:
     if one.is_group:
         return ["no such name", [3], {}]
     rule, wrong = one.rule, list(WRONG[one.kind])
-    if one.is_text:
+    if not one.allowed_words and one.kind is str:
         wrong.remove("no such word")
     beyond = 1 if one.kind is int else 1e-9
     if rule.least is not None:

@@ -62,7 +62,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add = parser.add_argument_group("files").add_argument
     add("--save", metavar="FILE", help="save the colony at the end (.npz)")
     add("--resume", metavar="FILE", help="resume a saved colony (.npz)")
-    picture = "draw the last tick (.png), or an animation (.gif or .mp4)"
+    picture = "draw the last tick (.png), or an animation (.gif)"
     add("--render", metavar="PATH", help=picture)
     add("--frame-interval", **COUNT, default=2, help="ticks per frame of an animation")
     figure = "plot the deliveries per tick of all colonies together (.png), with the numbers (.csv)"

@@ -1,7 +1,7 @@
 """Render an episode or a colony.
 
 Both use the policy in a file, or train one first. The extension of --out selects the file type:
-.gif, .mp4, .png (only the last tick) or .html, a page that plays. See `%(prog)s episode --help` for
+.gif, .png (only the last tick) or .html, a page that plays. See `%(prog)s episode --help` for
 the options of episodes.
 """
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 # Defaults that options change.
 TASK, TRAINING = Task(), TrainingConfig("sarsa", 0.001, 0.9, 0.3, 0.99)
 KINDS = {  # description and example of each subcommand
-    "episode": ("render an ant with a fixed policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
+    "episode": ("render an ant with a fixed policy", "--policy my.npz --epsilon 0.1 --out ant.gif"),
     "colony": ("render many ants with the same fixed policy", "--ants 200 --out ants.gif"),
 }
 

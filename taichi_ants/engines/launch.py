@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from functools import cache
 from itertools import accumulate
 from typing import Any
@@ -57,7 +56,7 @@ class Launch:
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
         """Compile the kernel and make its pack, as Taichi does at a launch."""
-        kind = _pack_type(tuple((name, _kind(value)) for name, value in values.items()))
+        kind = _pack_type(tuple((name, *_kind(value)) for name, value in values.items()))
         self._kernel = self._kernel_of(kind)
         taichi = ti.lang.impl.get_runtime()
         program, kernel = taichi.prog, self._kernel._primal
@@ -65,13 +64,20 @@ class Launch:
         self._pack = pack = _Pack(kind, dict(values))
         memory = pack._ArgPack__argpack
         finalize(pack, _delete, ref(taichi), memory).atexit = False
-        with runtime.quiet(), _naming_plugins():
-            lowered = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
-            compiled = program.compile_kernel(program.config(), program.get_device_caps(), lowered)
+        config = program.config()
+        try:
+            with runtime.quiet():
+                lowered = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
+                compiled = program.compile_kernel(config, program.get_device_caps(), lowered)
+        except ti.TaichiCompilationError as error:  # only code of plugins causes one
+            raise AntsError(
+                f"Taichi cannot compile a kernel with your code: {last_line(error)}; try it with "
+                "`taichi-ants check FILE`."
+            ) from error
         self._context = lowered.make_launch_context()
         self._context.set_arg_argpack((0,), memory)
-        on_cpu = program.config().arch in (ti.x64, ti.arm64)
-        self._compiled = compiled if on_cpu else None  # a GPU copies arrays at each launch
+        # A GPU copies arrays at each launch.
+        self._compiled = compiled if config.arch in (ti.x64, ti.arm64) else None
         # The context needs the arrays as further arguments after the pack.
         arrays = [name for name, value in values.items() if isinstance(value, np.ndarray)]
         self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
@@ -89,18 +95,6 @@ class Launch:
                 self._places[name], value.ctypes.data, value.nbytes, value.shape, 0
             )
         self._known[name] = value
-
-
-@contextmanager
-def _naming_plugins() -> Iterator[None]:
-    """Turn errors of Taichi's compiler, which only code of plugins causes, into AntsError."""
-    try:
-        yield
-    except ti.TaichiCompilationError as error:
-        raise AntsError(
-            f"Taichi cannot compile a kernel with your code: {last_line(error)}; try it with "
-            "`taichi-ants check FILE`."
-        ) from error
 
 
 def last_line(error: Exception) -> str:
@@ -152,11 +146,9 @@ def _kind(value: Any) -> tuple[str, int]:
 
 
 @cache
-def _pack_type(kinds: tuple[tuple[str, tuple[str, int]], ...]) -> Any:
-    types = {name: (getattr(ti, dtype), ndim) for name, (dtype, ndim) in kinds}
-    return ti.types.argpack(
-        **{
-            name: ti.types.ndarray(dtype=dtype, ndim=ndim) if ndim else dtype
-            for name, (dtype, ndim) in types.items()
-        }
-    )
+def _pack_type(kinds: tuple[tuple[str, str, int], ...]) -> Any:
+    types = {}
+    for name, kind, ndim in kinds:
+        dtype = getattr(ti, kind)
+        types[name] = ti.types.ndarray(dtype=dtype, ndim=ndim) if ndim else dtype
+    return ti.types.argpack(**types)

@@ -7,14 +7,12 @@ bits. This module does not import Taichi.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from enum import IntEnum, auto
 
 import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.learners.learner import Memory
 from taichi_ants.task.constants import BEST_AT, EMPTY, N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
@@ -33,8 +31,7 @@ RETURNS, STEPS, DELIVERIES = range(len(OUTCOMES))
 # The columns of a trace, which has one row per step, by the names of fields of `Trace`.
 TRACE = (
     *("episodes", "steps", "cells", "headings", "paper_states", "states", "actions", "rewards"),
-    *("next_paper_states", "next_states", "terminated", "events"),
-    "executed",
+    *("next_paper_states", "next_states", "terminated", "events", "executed"),
 )
 
 
@@ -84,11 +81,3 @@ def note_best_actions(q: np.ndarray) -> None:
     rows = q.reshape(-1, ROW)
     values = rows[:, :N_ACTIONS]
     rows[:, BEST_AT] = (values >= values.max(axis=1, keepdims=True)) @ (1 << np.arange(N_ACTIONS))
-
-
-def padded(memory: Memory) -> Memory:
-    """Return a memory with sizes rounded up to multiples of 8, for kernels with an array of them.
-
-    Compilers then know that neighbouring addresses differ only in their last bits.
-    """
-    return replace(memory, floats=-(-memory.floats // 8) * 8, integers=-(-memory.integers // 8) * 8)

@@ -28,7 +28,7 @@ from taichi_ants.envs.vector import (
     Worlds,
     task_of,
 )
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
+from taichi_ants.errors import check_one_of, checked_whole, shown
 from taichi_ants.features.support import CHOICE, LONE
 from taichi_ants.records import Snapshot
 from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
@@ -68,8 +68,7 @@ class LoneAnts(Ants):
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
         most = _MOST_CELLS // self.worlds[0].grid.size
-        if n > most:
-            raise AntsError(f"num_envs is {n}; it must be at most {most} for a world of this size.")
+        checked_whole("num_envs", n, 1, most, " for a world of this size")
         self._text = arguments.render_mode == "ansi"
         self.batched = BatchedEnvironments(
             self.worlds, task, n, self.max_steps, delivery, task.evaporation_in_training
@@ -79,11 +78,11 @@ class LoneAnts(Ants):
         seed_of = {i: seed for i, seed in enumerate(seeds) if which[i] and seed is not None}
         if seed_of:
             self.batched.seed(list(seed_of.values()), np.array(list(seed_of)))
-        self.batched.begin(which)
+        self.batched.step(0, np.where(which, Command.BEGIN, Command.WAIT))
 
     def advance(self, actions: np.ndarray, waiting: np.ndarray) -> Step:
         begins = waiting if self.mode is AutoresetMode.NEXT_STEP else 0
-        self.batched.step(actions, begins, same_step=self.mode is AutoresetMode.SAME_STEP)
+        self.batched.step(actions, begins, _AFTER_END[self.mode])
         arrays = self.batched.arrays
         results = arrays["results"]
         return arrays["rewards_of"].copy(), results & TERMINATED != 0, results & TRUNCATED != 0

@@ -96,14 +96,10 @@ class TablePolicy(NamedTuple):
         return _KTH.take(allowed * N_ACTIONS + k)
 
 
-def _actions_of_masks() -> np.ndarray:
-    """Return action number k of each mask, int64 (32, 5)."""
-    bits = np.arange(_ALL_ACTIONS + 1)[:, None] >> np.arange(N_ACTIONS) & 1
-    return np.argsort(1 - bits, axis=1, kind="stable")
-
-
-_KTH = _actions_of_masks().reshape(-1)
-_COUNTS = np.array([mask.bit_count() for mask in range(_ALL_ACTIONS + 1)], np.uint64)
+_BITS = np.arange(_ALL_ACTIONS + 1)[:, None] >> np.arange(N_ACTIONS) & 1
+# Action number k of each mask, and the number of actions of each mask.
+_KTH = np.argsort(1 - _BITS, axis=1, kind="stable").reshape(-1)
+_COUNTS = _BITS.sum(axis=1).astype(np.uint64)
 
 
 def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from taichi_ants.errors import checked_whole
@@ -66,8 +66,14 @@ class Learner:
         return self.hyperparameters(**dict(config.hyperparameters))
 
     def memory_for(self, config: TrainingConfig, n_states: int) -> Memory:
-        """Return the memory for a configuration and tables of n_states rows."""
-        return self.memory(self.settings(config), n_states)
+        """Return the memory for a configuration and tables of n_states rows.
+
+        Sizes are rounded up to multiples of 8: compilers of kernels with an array of memories then
+        know that neighbouring addresses differ only in their last bits.
+        """
+        memory = self.memory(self.settings(config), n_states)
+        floats, integers = (-(-size // 8) * 8 for size in (memory.floats, memory.integers))
+        return replace(memory, floats=floats, integers=integers)
 
 
 def td_learner(

@@ -54,7 +54,8 @@ def fields() -> Iterator[dict[str, Any]]:
     "default". "only" (a path and its values), "world" and "learner" limit a field to these.
     """
     for setting in all_of(Task):
-        has_no_field = setting.is_group or setting.is_text or setting.kind is Named
+        is_text = setting.kind is str and not setting.allowed_words
+        has_no_field = setting.is_group or is_text or setting.kind is Named
         if not has_no_field and not setting.path.startswith(_OF_CASTES):
             yield _field(setting)
     for setting in declared(TrainingConfig)[1:]:

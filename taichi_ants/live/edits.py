@@ -45,7 +45,7 @@ def values(interventions: Interventions) -> dict[str, Value]:
     - RULE.PARAMETER: a parameter of a rule that you wrote.
     """
     colony, pheromone = interventions.colony, interventions.colony.pheromones[0]
-    living = int(np.count_nonzero(colony.living[0]))
+    living, rules = int(np.count_nonzero(colony.living[0])), "task.pheromone"
     values = {"ants": Value(max(living, 1), 1, colony.capacity, 1, "ants")}
     if colony.task.choice.needs_table:
         values["epsilon"] = Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon")
@@ -55,7 +55,7 @@ def values(interventions: Interventions) -> dict[str, Value]:
     for name, setting, largest in numbers:
         number = getattr(pheromone, setting)
         if number is not None and not (setting == "level" and pheromone.deposit == "none"):
-            values[name] = Value(int(number), 1, max(largest, int(number)), 1, _path(setting))
+            values[name] = Value(int(number), 1, max(largest, int(number)), 1, f"{rules}.{setting}")
     falls, evaporating = pheromone.evaporation != "none", colony.task.pheromone
     if evaporating.evaporation == "none":
         evaporating = replace(evaporating, evaporation="linear")
@@ -68,12 +68,12 @@ def values(interventions: Interventions) -> dict[str, Value]:
     if pheromone.half_life is not None:
         half_life = float(pheromone.half_life)
         values["half_life"] = Value(
-            half_life, min(1.0, half_life), max(1000.0, half_life), 0.5, _path("half_life")
+            half_life, min(1.0, half_life), max(1000.0, half_life), 0.5, f"{rules}.half_life"
         )
     if pheromone.dense:  # integer trails cannot diffuse, and dense trails cannot become integers
         least = 0.0 if pheromone.evaporation == "exponential" else min(0.01, pheromone.diffusion)
         values["diffusion"] = Value(
-            float(pheromone.diffusion), float(least), 1.0, 0.01, _path("diffusion")
+            float(pheromone.diffusion), float(least), 1.0, 0.01, f"{rules}.diffusion"
         )
     return values | _of_rules(colony.task.rules)
 
@@ -94,10 +94,6 @@ def _of_rules(rules: Mapping[str, Parameters]) -> dict[str, Value]:
             path = f"task.rules.{name}.{setting.name}"
             values[f"{name}.{setting.name}"] = Value(value, least, most, step, path, help=help)
     return values
-
-
-def _path(name: str) -> str:
-    return f"task.pheromone.{name}"
 
 
 def checked(edit: object, interventions: Interventions) -> Intervention:

@@ -1,4 +1,4 @@
-"""Pictures and animations of worlds and their ants: PNG, GIF and MP4, without a display.
+"""Pictures and animations of worlds and their ants: PNG and GIF, without a display.
 
 - `picture` draws a world at its start.
 - `frames` draws the snapshots of `Episode.snapshots` or `colony_snapshots` as arrays; `Scene`

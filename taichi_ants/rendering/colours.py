@@ -37,17 +37,17 @@ def channels(colours: int | np.ndarray) -> np.ndarray:
     return (words >> np.array([16, 8, 0], dtype=np.uint32)).astype(np.uint8)
 
 
-def _packed(rgb: np.ndarray) -> np.ndarray:
-    """Return colours 0xRRGGBB, uint32 (...), of red, green and blue, numbers (..., 3)."""
-    return np.rint(rgb).astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)
+def packed(rgb: np.ndarray) -> np.ndarray:
+    """Return colours 0xRRGGBB, uint32 (...), of whole red, green and blue (..., 3)."""
+    red, green, blue = (rgb[..., channel].astype(np.uint32) for channel in range(3))
+    return red << 16 | green << 8 | blue
 
 
 _samples = channels(np.array([int(word, 16) for word in _TRAIL_SAMPLES.split()])).T
 _places = np.linspace(0, _samples.shape[1] - 1, 256)
+_ramp = [np.interp(_places, range(len(channel)), channel) for channel in _samples]
 # uint32 (256,): colours of trails from just above level 0 to `strongest`.
-TRAIL_RAMP = _packed(
-    np.stack([np.interp(_places, range(len(channel)), channel) for channel in _samples], axis=-1)
-)
+TRAIL_RAMP = packed(np.rint(np.stack(_ramp, axis=-1)))
 TRAIL_RAMP.setflags(write=False)
 
 # The darkest colours of further fields, which repeat.
@@ -59,7 +59,7 @@ def field_ramp(number: int) -> np.ndarray:
     """Return the colours of further field `number`, from 0, from weak to strong, uint32 (256,)."""
     ends = channels(np.array([CELL_EMPTY, _FIELDS[number % N_FIELDS]])).astype(float)
     parts = np.linspace(0.31, 1.0, 256)[:, None]
-    return _packed(ends[0] * (1 - parts) + ends[1] * parts)
+    return packed(np.rint(ends[0] * (1 - parts) + ends[1] * parts))
 
 
 # The colours of nests, for the queen and her ants, and of kinds of food, by number.
@@ -69,7 +69,7 @@ QUEENS, ANTS = (np.array([first, *_NESTS], np.uint32) for first in (CELL_QUEEN, 
 FOODS = np.array(_FOODS, np.uint32)
 # Their light backgrounds.
 QUEEN_FLOORS, FOOD_FLOORS = (
-    np.append(first, _packed(0.85 * channels(PAGE) + 0.15 * channels(several[1:])))
+    np.append(first, packed(np.rint(0.85 * channels(PAGE) + 0.15 * channels(several[1:]))))
     for first, several in ((np.uint32(FLOOR_QUEEN), QUEENS), (np.uint32(FLOOR_FOOD), FOODS))
 )
 

@@ -14,7 +14,7 @@ from taichi_ants.records import Snapshot
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks
-from taichi_ants.task import Observation, Pheromone, Task, observations
+from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, FOOD, N_ACTIONS, QUEEN
 from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.states import TASK_NAMES
@@ -87,12 +87,6 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
     return size[0], size[1]
 
 
-def _scale(pheromone: Pheromone) -> int | None:
-    """Return the level of the darkest colour, None if the rules do not tell usual levels."""
-    told = pheromone.deposit in ("none", "set", "fading") and not pheromone.diffusion
-    return pheromone.darkest if told else None
-
-
 class Scene:
     """Draws snapshots of worlds of one grid as pictures of one size.
 
@@ -130,7 +124,10 @@ class Scene:
         expect("task", task, Task, type(None))
         self._task, self._title, self._overlay = task, title, overlay
         fields = {} if task is None else {TRAIL: task.pheromone, **task.fields}
-        scales = {TRAIL: strongest, **{name: _scale(field) for name, field in fields.items()}}
+        scales: dict[str, int | None] = {TRAIL: strongest}
+        for name, rule in fields.items():
+            told = rule.deposit in ("none", "set", "fading") and not rule.diffusion
+            scales[name] = rule.darkest if told else None  # None: the rules tell no usual levels
         width, self._height = check_size(size)
         shorter = min(size)
         letters, margin = round(shorter / 38), max(2, round(shorter / 60))

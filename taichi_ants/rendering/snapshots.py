@@ -14,7 +14,7 @@ import numpy as np
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.results import RolloutArguments, Trace
 from taichi_ants.engines.runs.training import rollout
-from taichi_ants.errors import AntsError, checked_whole, expect
+from taichi_ants.errors import checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
@@ -146,9 +146,8 @@ def intervals(colony: Colony, ticks: int, frame_interval: int, follow: int | Non
     ticks = checked_whole("ticks", ticks, least=0)
     every = checked_whole("frame_interval", frame_interval)
     if follow is not None:
-        checked_whole("follow", follow, least=0)
-        if follow >= colony.ants and not colony.task.life.births:
-            raise AntsError(f"follow is {follow}; it must be from 0 to {colony.ants - 1}.")
+        most = 2**31 - 1 if colony.task.life.births else colony.ants - 1
+        checked_whole("follow", follow, 0, most)
     return [min(every, ticks - done) for done in range(0, ticks, every)]
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Iterator
-from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, BinaryIO
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError, expect, imported
+from taichi_ants.errors import AntsError, expect
 from taichi_ants.rendering import colours
 from taichi_ants.settings import Setting, checked_arguments
 
@@ -41,16 +40,13 @@ def check_animation(path: files.PathLike, fps: Fps = 8.0) -> Path:
     """Return the path of an animation after checking that it can be written.
 
     Args:
-        path: A .gif or .mp4 file, or a .png file for the last frame.
+        path: A .gif file, or a .png file for the last frame.
         fps: Frames per second, 0.1 to 50.
 
     Raises:
-        AntsError: An argument is not allowed, the path is not writable, or PyAV is missing.
+        AntsError: An argument is not allowed, or the path is not writable.
     """
-    target = check_file(path, "an animation", *_ENCODERS)
-    if target.suffix.lower() == ".mp4":
-        imported("an MP4 file", "av", "video")
-    return target
+    return check_file(path, "an animation", ".png", ".gif")
 
 
 def is_picture(path: files.PathLike) -> bool:
@@ -93,9 +89,11 @@ def save_animation(
     target = check_animation(path, fps)
     expect("frames", frames, Iterable)
     checked = _checked(frames, round(pause * fps) - 1)
-    content, first = io.BytesIO(), next(checked)
-    _ENCODERS[target.suffix.lower()](content, first, chain([first], checked), fps)
-    write(target, content.getvalue())
+    if is_picture(target):
+        *_, last = checked
+        write(target, png(last, optimize=True))
+    else:
+        write(target, _gif(checked, fps))
 
 
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
@@ -140,75 +138,48 @@ def png(frame: np.ndarray, optimize: bool = False) -> bytes:
     return buffer.getvalue()
 
 
-def _gif(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
-    """Write a GIF that repeats forever; Pillow merges equal frames and stores only changes."""
-    images = _with_palette(frames, _palette(first), fps)
+def _gif(frames: Iterable[np.ndarray], fps: float) -> bytes:
+    """Return a GIF that repeats forever; Pillow merges equal frames and stores only changes."""
+    buffer, images = io.BytesIO(), _with_palette(frames, fps)
     changes = {"optimize": True, "transparency": _UNCHANGED, "disposal": 1}
-    next(images).save(file, "GIF", save_all=True, append_images=images, loop=0, **changes)
+    next(images).save(buffer, "GIF", save_all=True, append_images=images, loop=0, **changes)
+    return buffer.getvalue()
 
 
-def _with_palette(frames: Iterable[np.ndarray], palette: np.ndarray, fps: float) -> Iterator[Image]:
-    """Yield frames in the nearest colours of a palette, each with its duration."""
+def _with_palette(frames: Iterable[np.ndarray], fps: float) -> Iterator[Image]:
+    """Yield frames in the nearest colours of the first frame's palette, with their durations."""
     from PIL import Image
 
     nearest = np.full(1 << 24, -1, np.int16)  # the index of each colour in the palette, once known
-    before, told, still = np.zeros(0), 0, 0  # milliseconds so far, and of the present picture
+    before = indices = palette = np.zeros(0, np.uint8)
+    told, still = 0, 0  # milliseconds so far, and of the present picture
     for number, frame in enumerate(frames, start=1):
-        words = frame.astype(np.int32) @ (1 << 16, 1 << 8, 1)
+        if number == 1:
+            palette, before = _palette(frame), ~frame
+            indices = np.zeros(frame.shape[:2], np.uint8)
+        # Most pixels stay, so only rows that change are converted.
+        rows = np.flatnonzero((frame != before).any(axis=(1, 2)))
+        words, shown = colours.packed(frame[rows]), indices.copy()
         new = np.unique(words[nearest[words] < 0])
         for some in np.array_split(new, 1 + len(new) // 4096):
             away = colours.channels(some)[:, None].astype(np.int32) - palette
             nearest[some] = (away**2).sum(axis=2).argmin(axis=1)
-        indices = nearest[words].astype(np.uint8)
+        shown[rows] = nearest[words]
         # GIF durations are in hundredths of a second. Rounding the end time keeps their sum exact.
         until = 10 * round(100 * number / fps)
-        still = until - told + (still if np.array_equal(indices, before) else 0)
-        image = Image.fromarray(indices)
+        same = number > 1 and np.array_equal(shown, indices)
+        still = until - told + (still if same else 0)
+        image = Image.fromarray(shown)
         image.putpalette(palette.tobytes().ljust(3 * 256, b"\0"))
         image.info["duration"] = until - told if still <= _LONGEST else 0
         yield image
-        before, told = indices, until
+        before, indices, told = frame.copy(), shown, until
 
 
 def _palette(first: np.ndarray) -> np.ndarray:
     """Return a palette for all frames, uint8 (n, 3): the colours of scenes and the first frame."""
     from PIL import Image
 
-    kept = colours.channels(_KEPT)
-    # Colours packed into integers sort several times faster than rows.
-    sample = colours.channels(np.unique(first.astype(np.int32) @ (1 << 16, 1 << 8, 1)))
+    kept, sample = map(colours.channels, (_KEPT, np.unique(colours.packed(first))))
     free = Image.fromarray(sample[None]).quantize(_UNCHANGED - len(kept)).getpalette()
     return np.concatenate([kept, np.array(free, dtype=np.uint8).reshape(-1, 3)])[:_UNCHANGED]
-
-
-def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
-    """Write an MP4 (H.264), without the last column or row of an odd width or height."""
-    av = imported("an MP4 file", "av", "video")
-    from fractions import Fraction
-
-    height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2
-    with av.open(file, "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
-        stream.width, stream.height = width, height
-        stream.pix_fmt = "yuv420p"
-        stream.options = {
-            **{"crf": "17", "preset": "superfast", "tune": "animation"},
-            "x264-params": "colorprim=bt709:transfer=bt709:colormatrix=bt709",
-        }
-        for frame in frames:
-            picture = np.ascontiguousarray(frame[:height, :width])
-            video = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            # Players assume BT.709 for such videos, but PyAV's default is BT.601.
-            video = video.reformat(format="yuv420p", dst_colorspace="ITU709")
-            container.mux(stream.encode(video))
-        container.mux(stream.encode())
-
-
-def _png(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
-    """Write the last frame."""
-    *_, last = frames
-    file.write(png(last, optimize=True))
-
-
-# Functions that write frames into a file, by its ending.
-_ENCODERS = {".png": _png, ".gif": _gif, ".mp4": _mp4}

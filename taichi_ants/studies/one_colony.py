@@ -107,7 +107,7 @@ def live(
     """Run a colony for `ticks` ticks, or until `stopped()` is true, and write its files.
 
     `save` is the file of the colony, which is saved even if drawing fails. `render` is a picture
-    (.png) of the end, or an animation (.gif, .mp4). `figure` (.png) shows deliveries over
+    (.png) of the end, or an animation (.gif). `figure` (.png) shows deliveries over
     time; their numbers are in a file with the same name (.csv).
     """
     from taichi_ants.rendering import colony_snapshots, frames, save_animation, save_picture

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -100,6 +99,6 @@ def replay(
 
     timetable = Timetable(colony, point.events(learns=False), point.ticks)
     with timetable:
-        for _ in timetable.pieces(SimpleNamespace(pieces=stepped), point.ticks):  # type: ignore[arg-type]
+        for _ in timetable.pieces(stepped, point.ticks):
             pass
     return Recording(recorder.header(), frames), kept

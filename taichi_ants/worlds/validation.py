@@ -28,22 +28,11 @@ def parse_ranges(ranges: object) -> tuple[int, int, int]:
 
 
 def parse_contents(
-    grid: AxialGrid,
-    queens: Any,
-    foods: Any,
-    food_kinds: Any,
-    obstacles: Any,
-    trails: Any,
-    ants: Any,
+    grid: AxialGrid, queens: Any, food_kinds: Any, **parts: Any
 ) -> dict[str, np.ndarray]:
     """Return the checked contents of a world by field, with coordinates in normal form."""
-    contents = {
-        "queens": _queens(queens, grid),
-        "foods": _parse("foods", _with_kinds(foods), grid),
-        "obstacles": _parse("obstacles", obstacles, grid),
-        "trails": _parse("trails", trails, grid),
-        "ants": _parse("ants", ants, grid),
-    }
+    contents = {name: _parse(name, values, grid) for name, values in parts.items()}
+    contents = {"queens": _queens(queens, grid), **contents}
     if entries_of(food_kinds):
         (n, _), most = contents["foods"].shape, MAX_FOOD_KINDS - 1
         contents["foods"][:, 3] = as_array("food_kinds", food_kinds, "iu", (n,), 0, most)
@@ -109,31 +98,27 @@ def _queens(values: object, grid: AxialGrid) -> np.ndarray:
     return queens
 
 
-def _with_kinds(foods: Any) -> Any:
-    """Return rows (x, y, z, kind); the kind of each row without one is 0."""
-    rows = _flat(foods)
-    if isinstance(rows, list):
-        return [[*row, 0] if isinstance(row, list) and len(row) == 3 else row for row in rows]
-    if isinstance(rows, np.ndarray) and rows.shape[1:] == (3,):
-        return np.column_stack([rows, np.zeros_like(rows[:, :1])])
-    return rows
+def _rows(name: str, values: Any) -> Any:
+    """Return an array, or entries as lists, ((x, y, z), number) as (x, y, z, number).
 
-
-def _flat(values: Any) -> Any:
-    """Return entries as lists, ((x, y, z), number) as (x, y, z, number); arrays unchanged."""
-    entries = None if isinstance(values, np.ndarray) else entries_of(values)
-    if entries is None:
+    The kind of a food without one is 0.
+    """
+    if isinstance(values, np.ndarray):
+        has_no_kinds = name == "foods" and values.shape[1:] == (3,)
+        return np.pad(values, ((0, 0), (0, 1))) if has_no_kinds else values
+    if (rows := entries_of(values)) is None:
         return values
-    rows = [entries_of(entry) or entry for entry in entries]
-    for i, row in enumerate(rows):
+    for i, entry in enumerate(rows):
+        row = entries_of(entry) or entry
         if isinstance(row, list) and len(row) == 2 and entries_of(row[0]):
-            rows[i] = [*row[0], row[1]]
+            row = [*row[0], row[1]]
+        rows[i] = [*row, 0] if name == "foods" and isinstance(row, list) and len(row) == 3 else row
     return rows
 
 
 def _parse(name: str, values: Any, grid: AxialGrid) -> np.ndarray:
     """Return entries in normal form, int32 (n, 3), or (n, 4) if they have a number."""
-    rows, columns = _flat(values), 4 if name in _NUMBERS else 3
+    rows, columns = _rows(name, values), 4 if name in _NUMBERS else 3
     if not rows if isinstance(rows, list) else np.size(rows) == 0:
         return np.zeros((0, columns), np.int32)
     entries = as_array(name, rows, "iu", (None, columns), -FAR, FAR).astype(np.int64)

@@ -79,8 +79,9 @@ class World:
     ) -> None:
         others = np.asarray(other_queens).tolist()
         grid = AxialGrid(validation.parse_ranges(ranges))
+        parts = {"foods": foods, "obstacles": obstacles, "trails": trails, "ants": ants}
         contents: dict[str, Any] = validation.parse_contents(
-            grid, [queen, *others] if others else queen, foods, food_kinds, obstacles, trails, ants
+            grid, [queen, *others] if others else queen, food_kinds, **parts
         )
         queens = contents.pop("queens")
         if not contents["food_kinds"].any():

@@ -42,9 +42,6 @@ observation = "ants"
 life.regrowth = 0
 [vary]
 policy = ["old/rule.npz", "trail_follower"]
-[[at]]
-tick = 20
-policy = "old/rule.npz"
 """
 
 
@@ -221,7 +218,7 @@ def test_bad_archives_are_refused_and_leave_nothing(here, capsys, monkeypatch):
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [("preset = ", 'preset = "/etc/hostname" #'), ('policy = "old', 'policy = "../secret.npz" #')],
+    [("preset = ", 'preset = "/etc/hostname" #'), ('"old/rule.npz"', '"../secret.npz"')],
 )
 def test_a_study_in_an_archive_reads_no_other_files(old, new, copy, capsys):
     """Also with valid checksums."""
@@ -241,7 +238,7 @@ def test_a_changed_import_of_the_plugin_changes_the_study(tmp_path, capsys, monk
     monkeypatch.chdir(tmp_path)
     Path("my_plugin.py").write_text(PLUGIN)
     Path("ants_halved.py").write_text(BESIDE)
-    sweep = SWEEP.replace("MAP", "paper").replace('"old/rule.npz", ', "").partition("[[at]]")[0]
+    sweep = SWEEP.replace("MAP", "paper").replace('"old/rule.npz", ', "")
     Path("my.toml").write_text(sweep)
     given = ["my.toml", "--plugin", "my_plugin.py", "--out", "a", "--no-figures"]
     assert call("sweep", given, capsys)[0] == 0

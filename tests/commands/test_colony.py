@@ -10,15 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_lines import (
-    EXPERIMENTS,
-    assert_one_sentence,
-    call,
-    environment,
-    promptly,
-    run,
-    start,
-)
+from command_lines import EXPERIMENTS, assert_one_sentence, call, environment, promptly, run, start
 
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
 from taichi_ants.commands import colony as command
@@ -91,7 +83,7 @@ def test_a_colony_that_is_saved_and_resumed_is_the_one_that_lived_on(capsys, tmp
         assert one.files == other.files
         assert all(np.array_equal(one[name], other[name]) for name in one.files)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        *("end.png", "part.npz", "rest.gif", "whole.npz"),
+        *("end.png", "part.npz", "rest.gif", "whole.npz")
     ]
 
 

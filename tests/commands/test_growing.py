@@ -12,14 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from command_lines import (
-    assert_one_sentence,
-    assert_same_results,
-    call,
-    contents,
-    promptly,
-    start,
-)
+from command_lines import assert_one_sentence, assert_same_results, call, contents, promptly, start
 
 from taichi_ants.studies.folder import sessions_in, status, write_json
 from taichi_ants.studies.points import ColonyPoint, RunPoint
@@ -170,12 +163,15 @@ def test_a_folder_of_something_else_is_left_alone(sweep):
     assert sorted(path.name for path in Path("a").iterdir()) == ["manifest.json", "runs.csv"]
 
 
-def test_a_table_that_was_changed_or_removed_is_written_again(sweep, monkeypatch):
+@pytest.mark.parametrize("change", ["appended", "removed"])
+def test_a_table_that_was_changed_or_removed_is_written_again(change, sweep, monkeypatch):
     assert sweep(RUNS, "a")[0] == 0
     before = contents(Path("a"))
-    with open("a/runs.csv", "a") as file:
-        file.write("0,0,0,0,0\n")
-    Path("a/summary.csv").unlink()
+    if change == "appended":
+        with open("a/runs.csv", "a") as file:
+            file.write("0,0,0,0,0\n")
+    else:
+        Path("a/summary.csv").unlink()
     monkeypatch.setattr(RunPoint, "compute", None)
     assert sweep(RUNS, "a")[::2] == (0, "")
     after = contents(Path("a"))

@@ -7,14 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_lines import (
-    EXPERIMENTS,
-    assert_one_sentence,
-    call,
-    contents,
-    numbers_in,
-    read_csv,
-)
+from command_lines import EXPERIMENTS, assert_one_sentence, call, contents, numbers_in, read_csv
 
 from taichi_ants import (
     AntsError,
@@ -349,7 +342,6 @@ def test_a_protocol_is_part_of_the_points_of_a_sweep(sweep, tmp_path):
     assert facts["protocol"][1][0]["at"]["remove_ants"] == {"share": 0.5}
 
 
-IN_TRAINING = "in [[at]] number 1, in the training, the"
 WRONG_EVENTS = {
     "tick": ("tick = 20", "tick = 60", ["`at.tick` is 60, but episodes have 60 ticks"]),
     "name": ("trail = 0", "trial = 0", ["in [[at]] number 1, `at.trial` is not a setting"]),
@@ -359,7 +351,6 @@ WRONG_EVENTS = {
         "learning_rate",
         ["in [[at]] number 1, in the evaluation, the ants"],
     ),
-    "policy": ("trail = 0", 'policy = "random"', [f"{IN_TRAINING} ants of this colony learn"]),
     "one table": ("[[every]]", "[every]", ["write [[every]] in double brackets"]),
     "number": ("at.1.remove", "at.2.remove", ["in [[at]] number 2, `at.tick` is missing"]),
     "kind": ('kind = "colony"', 'kind = "runs"', ["is for kind 'colony'"]),
@@ -465,7 +456,7 @@ def test_a_design_has_rows_of_drawn_values_indices_and_figures(sweep):
     assert {row["task.noise.misread"] for row in rows} == {0.01}
     indices = numbers_in(folder / "sensitivity.csv")
     assert [(row["measure"], row["setting"].rpartition(".")[2]) for row in indices][:3] == [
-        *(("blocked", "half_life"), ("blocked", "view"), ("blocked", "slip")),
+        *(("blocked", "half_life"), ("blocked", "view"), ("blocked", "slip"))
     ]
     assert all(0 <= row["seed_share"] <= 1 for row in indices)
     assert "20 points of the design 'sobol'; the 10 with the highest blocked:" in out

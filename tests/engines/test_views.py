@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_worlds import random_world
 
 from taichi_ants import AntsError, Colony, TrainingConfig, rollout, train
 from taichi_ants.task import Field, Observation, Task, observations
@@ -108,30 +107,6 @@ def of_home(view):
     if view.own_home >= 1:
         index += 8
     return index
-
-
-@pytest.mark.parametrize("diffusion", [0.0, 0.3])
-def test_a_field_is_read_by_its_name(diffusion):
-    """After each tick, the states are those that the levels of the snapshot give."""
-    observations.register(Observation("homely", 16, of_home, reads=("home",)))
-    home = Field(deposited_when="without_food", deposit="fading", diffusion=diffusion)
-    rules = {"fields": {"other": Field(), "home": home}, "evaporation_in_training": True}
-    colony = Colony(random_world(5, 7), Task("homely", **rules), CONFIG, ants=6)
-    colony.begin_episode()
-    seen = set()
-    for _ in range(30):
-        colony.tick()
-        now, grid = colony.snapshot(), colony.grid
-        level, open_to_ants = now.fields["home"], now.ground == 0
-        for cell, heading, state in zip(
-            colony.cells[0].tolist(), colony.headings[0].tolist(), colony.states[0], strict=True
-        ):
-            ahead = [cell + grid.offsets[(heading + turn) % 6] for turn in (-1, 0, 1)]
-            levels = [level[one] * (open_to_ants[one] and grid.exists[one]) for one in ahead]
-            bits = [one > level[cell] for one in levels]
-            assert state == 8 * (level[cell] >= 1) + 4 * bits[0] + 2 * bits[1] + bits[2]
-            seen.add(int(state))
-    assert len(seen) > 5
 
 
 def test_a_field_that_the_task_lacks_cannot_be_read():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -91,21 +91,6 @@ def test_what_is_no_archive_is_refused(
     with pytest.raises(AntsError, match=message) as raised:
         archives.read(path, foreign=True)
     assert str(path) in str(raised.value)
-
-
-def flips(content: bytes, n: int) -> Iterator[bytes]:
-    """The content with one bit flipped, at n places drawn at random."""
-    rng = np.random.default_rng(0)
-    for place, bit in zip(rng.integers(len(content), size=n), rng.integers(8, size=n), strict=True):
-        yield content[:place] + bytes([content[place] ^ 1 << bit]) + content[place + 1 :]
-
-
-def outcome(path: Path, content: bytes, foreign: bool) -> dict[str, np.ndarray] | None:
-    """The arrays; None if they are refused."""
-    try:
-        return archives.read(path, content, foreign=foreign)
-    except AntsError:
-        return None
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,6 @@ import pytest
 from taichi_ants import files
 from taichi_ants.errors import AntsError
 
-NOBODY = 65534
-
 
 def names(folder: Path) -> list[str]:
     return sorted(entry.name for entry in folder.iterdir())

@@ -83,7 +83,6 @@ def test_cells_beyond_the_array_are_refused() -> None:
 
 coordinates = st.integers(-1000, 1000)
 cells = st.tuples(coordinates, coordinates, coordinates)
-headings = st.integers(0, 5)
 ranges = st.tuples(*[st.integers(1, 12)] * 3)
 
 

@@ -281,7 +281,7 @@ WRONG = [
     (None, "an intervention is None"),
     ({"remove_ants": [0]}, "the cell 0 is outside the world"),
     ({"place": {"what": "queen", "cells": [60, 61]}}, "a single cell for the queen"),
-    ({"place": {"what": "rock", "cells": [60] * 10**6}}, "at most 400000 are allowed"),
+    ({"place": {"what": "rock", "cells": [60] * 400_001}}, "at most 400000 are allowed"),
     ({"task": {"pheromone.half_life": 9}}, "half_life` is 9.0; leave"),
     ({"ants": 41}, "ants is 41"),
 ]
@@ -326,6 +326,16 @@ def test_wrong_edits_change_nothing():
     follows = Session(SETUPS["queueing"])
     assert follows.values().keys() == {"ants", "epsilon", "deposit", "slope", "evaporation"}
     assert "no learning rate" in refused(follows, {"learning_rate": 0.5})
+
+
+def test_rates_that_were_set_decay_no_more():
+    session = Session(SETUPS["foraging"])
+    for edit in ({"epsilon": 0.5}, {"learning_rate": 0.4}, {"episode": {}}):
+        session.apply(edit)
+    for _ in range(4):
+        session.advance(10)
+    assert session.colony.episode > 1
+    assert (session.colony.epsilon, session.colony.learning_rate) == (0.5, 0.4)
 
 
 @pytest.mark.parametrize(

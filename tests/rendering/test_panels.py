@@ -13,7 +13,7 @@ from taichi_ants.rendering import Scene, Status, at_start, frames
 from taichi_ants.rendering.colours import CHOSEN
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import observations
-from taichi_ants.worlds import World, paper
+from taichi_ants.worlds import paper
 
 WORLD = paper()
 Q_VALUES = np.array([0.5, 7.0, -1.0, 0.0, 2.0], dtype=np.float32)
@@ -21,11 +21,6 @@ Q_VALUES = np.array([0.5, 7.0, -1.0, 0.0, 2.0], dtype=np.float32)
 
 def picture(size=(640, 400), status: Status | None = None, **look: object) -> np.ndarray:
     return Scene(WORLD.grid, size, **look).draw(at_start(WORLD), status)
-
-
-def places_of(world: World, cells: object, side: int) -> np.ndarray:
-    """Where a square picture without a panel shows cells."""
-    return Rasteriser(world.grid, side, side, max(2, round(side / 60))).centres(cells)
 
 
 def blue_columns(frame: np.ndarray, rows: slice = slice(None)) -> np.ndarray:

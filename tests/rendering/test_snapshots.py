@@ -115,7 +115,7 @@ def test_one_ant_of_a_colony_is_followed(observation) -> None:
     made.tick()
     _, status = next(colony_snapshots(made, follow=5))
     assert status.state is None
-    with pytest.raises(AntsError, match="follow is 20; it must be from 0 to 19"):
+    with pytest.raises(AntsError, match="follow is 20; it must lie between 0 and 19"):
         next(colony_snapshots(made, follow=20))
 
 

@@ -68,7 +68,7 @@ def random_task(rng):
     if rng.random() < 0.3:
         task = task.replace(foods={"seed": Food(loads=3)})
     scalars = [one for one in all_of(Task) if not one.is_group and one.default is not MISSING]
-    scalars = [one for one in scalars if one.kind in (bool, int, float, str) and not one.is_text]
+    scalars = [one for one in scalars if one.kind in (bool, int, float) or one.allowed_words]
     scalars = [one for one in scalars if len(one.allowed_words) != 1]
     for one in rng.choice(np.array(scalars, object), 8, replace=False):
         setting = next(each for each in scalars if each.path == one[1])

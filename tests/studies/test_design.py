@@ -157,16 +157,8 @@ WRONG = {
     ),
     "out of range": (SLIP, "{ from = 0, to = 1.5 }", ["noise.slip` is 1.5", "between 0 and 1"]),
     "steps": (SLIP, "{ from = 0, to = 1, steps = 3 }", ["slip.steps is 3", "'sobol'"]),
-    "whole": (
-        SLIP,
-        "{ from = 0, to = 0.5, whole = true }",
-        ["must be a whole number"],
-    ),
-    "below 1": (
-        f"task.noise.slip = {SLIP}",
-        "capacity = { from = 0, to = 3 }",
-        ["capacity is 0"],
-    ),
+    "whole": (SLIP, "{ from = 0, to = 0.5, whole = true }", ["must be a whole number"]),
+    "below 1": (f"task.noise.slip = {SLIP}", "capacity = { from = 0, to = 3 }", ["capacity is 0"]),
     "nothing varies": (
         f"half_life = {HALF}\ntask.noise.slip = {SLIP}",
         "half_life = 5",

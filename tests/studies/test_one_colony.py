@@ -14,7 +14,7 @@ from taichi_ants import AntsError, Colony, Task, TrainingConfig, worlds
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.rendering import writers
 from taichi_ants.studies.interruption import held, stoppable
-from taichi_ants.studies.one_colony import check_places, live, summary
+from taichi_ants.studies.one_colony import Span, Totals, check_places, draw, live, spans, summary
 
 TASK = Task(delivery="truncates", evaporation_in_training=True)
 TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
@@ -95,3 +95,21 @@ def test_the_summary_counts_in_words() -> None:
     assert one.endswith(" % of the moves blocked, 1 birth.")
     assert "\n2 deliveries by tick 1, " in two
     assert two.endswith(" % of the moves blocked, 2 births, 1 death.")
+
+
+TOTALS = [Totals(5, 10, 100, 50), Totals(7, 14, 300, 100), Totals(8, 14, 300, 100)]
+ROWS = [Span(5, 7, 2.0, 0.25), Span(7, 8, 0.0, 0.0)]
+
+
+def test_rates_are_means_over_spans_even_where_nobody_moves() -> None:
+    assert spans(TOTALS) == ROWS
+    assert spans(TOTALS[:1]) == []
+
+
+def test_the_figure_shows_its_rows() -> None:
+    upper, lower = draw(ROWS, "3 ants").axes
+    for axis, expected in ((upper, [2.0, 0.0]), (lower, [25.0, 0.0])):
+        steps = axis.patches[-1].get_data()
+        assert steps.values.tolist() == expected
+        assert np.array_equal(steps.edges, [5, 7, 8])
+    assert lower.get_xlim() == (5, 8)

@@ -184,11 +184,7 @@ class Made(Comparison):
 
 
 def _runs(
-    random: np.random.Generator,
-    row: Truth,
-    seed_effects: np.ndarray,
-    episodes: int,
-    noise: float,
+    random: np.random.Generator, row: Truth, seed_effects: np.ndarray, episodes: int, noise: float
 ) -> np.ndarray:
     """Return returns, steps and deliveries of a configuration, int32 (3, seeds, episodes)."""
     shape = len(seed_effects), episodes

@@ -20,10 +20,5 @@ def transition(
         **given,
     }
     return Transition(
-        number=number,
-        state=state,
-        action=action,
-        reward=reward,
-        next_state=next_state,
-        **facts,
+        number=number, state=state, action=action, reward=reward, next_state=next_state, **facts
     )

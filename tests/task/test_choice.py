@@ -7,7 +7,6 @@ import pytest
 from scipy.stats import chisquare
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, train, worlds
-from taichi_ants.envs.vector import Arguments
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import action_probabilities
 from taichi_ants.task import Choice, Field, Noise, Pheromone
@@ -117,7 +116,6 @@ def test_a_task_without_noise_draws_nothing():
 
 
 CELLS = Task(choice="deneubourg")
-GIVEN = Arguments("paper", 9, "index", None)  # to environments
 REFUSED = [
     (
         lambda: Colony(worlds.paper(), CELLS, PLAIN),

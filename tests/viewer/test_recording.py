@@ -215,7 +215,7 @@ def test_what_cannot_be_recorded_says_why():
     colony.begin_episode()
     with pytest.raises(AntsError, match="ticks is -1"):
         record_colony(colony, -1)
-    with pytest.raises(AntsError, match="follow is 3; it must be from 0 to 0"):
+    with pytest.raises(AntsError, match="follow is 3; it must lie between 0 and 0"):
         record_colony(colony, 1, follow=3)
     trace = rollout(worlds.paper(), trail_follower())
     object.__setattr__(trace, "arguments", None)

@@ -31,7 +31,7 @@ from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, NestRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
-from taichi_ants.errors import AntsError, count, entries_of, shown
+from taichi_ants.errors import AntsError, count, entries_of, refuse
 from taichi_ants.grid.constants import (
     N_HEADINGS,
     STREAM_BORN,
@@ -130,7 +130,7 @@ class _World:
             words = self.all.stream(self.w).bits(len(slots))
             self._remove(slots[np.argsort(words, kind="stable")[: self._amount(change)]])
         else:
-            self._remove(slots[np.isin(self.cells[slots], cells)])
+            self._remove(slots[np.isin(self.view("cell")[slots], cells)])
 
     def ants(self, change: language.SetAnts) -> Change:
         """Set the number of ants; new ants take free cells in the order of `World.start`."""
@@ -158,7 +158,7 @@ class _World:
         """
         held = self.view("ground")[there]
         ants, to = self._aside(there) if what != EMPTY else (there[:0], there[:0])
-        at = self.cells[ants]
+        at = self.view("cell")[ants]
         there = there[((held >> 4 == 0) | np.isin(there, at)) & (held != QUEEN)]  # see `layout`
         yield from self._start_with(there, what | kind << _NUMBER)
         self._step_aside(ants, to)
@@ -211,11 +211,6 @@ class _World:
     def view(self, name: str) -> np.ndarray:
         """Return a view of the world's part of an array."""
         return self.colony.part(name, self.w)
-
-    @property
-    def cells(self) -> np.ndarray:
-        """The cell of each slot."""
-        return self.view("cell")
 
     @property
     def queen_cells(self) -> np.ndarray:
@@ -283,8 +278,8 @@ class _World:
         free = (self.view("ground") == EMPTY) & grid.exists
         free[cells] = False
         living = np.flatnonzero(self.colony.living[self.w])
-        slots = living[np.isin(self.cells[living], cells)]
-        row, column = np.divmod(self.cells[slots], grid.width)
+        slots = living[np.isin(self.view("cell")[living], cells)]
+        row, column = np.divmod(self.view("cell")[slots], grid.width)
         to = np.full(len(slots), -1)
         for q, r in _STEPS.tolist():
             waiting = np.flatnonzero(to < 0)
@@ -300,8 +295,8 @@ class _World:
 
     def _step_aside(self, ants: np.ndarray, to: np.ndarray) -> None:
         """Move the ants in some slots to other cells."""
-        ground, at = self.view("ground"), self.cells[ants]
-        self.cells[ants] = to
+        ground, at = self.view("ground"), self.view("cell")[ants]
+        self.view("cell")[ants] = to
         ground[to] = ground[at]
         ground[at] = EMPTY
 
@@ -358,7 +353,7 @@ class _World:
         numbers = self.view("number")[slots]
         first = numbers < colony.ants  # their streams continue in the next episode
         self.view("first_streams")[numbers[first]] = self.view("streams")[slots[first]]
-        self.view("ground")[self.cells[slots]] = EMPTY
+        self.view("ground")[self.view("cell")[slots]] = EMPTY
         self.view("stage")[slots] = Stage.VACANT
         colony.close_gaps()
         self._count_ants()
@@ -411,10 +406,8 @@ class Interventions:
         n = len(colony.worlds)
         numbers = range(n) if worlds is None else entries_of(worlds)
         if not numbers or not all(isinstance(w, (int, np.integer)) and 0 <= w < n for w in numbers):
-            raise AntsError(
-                f"worlds is {shown(worlds)}; it must be a list of one or more numbers from 0 to "
-                f"{n - 1}, or None for all worlds."
-            )
+            allowed = f"a list of one or more numbers from 0 to {n - 1}, or None for all worlds"
+            refuse("worlds", worlds, allowed)
         self.worlds = tuple(dict.fromkeys(map(int, numbers)))
         self._first = colony.worlds
         self.starts = [_start_of(world) for world in colony.worlds] if lasting else []

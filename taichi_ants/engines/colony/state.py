@@ -33,7 +33,7 @@ from taichi_ants.engines.colony.layout import (
     chunks_of,
     usual_schedule,
 )
-from taichi_ants.engines.layout import compass_of, note_best_actions, padded
+from taichi_ants.engines.layout import compass_of, note_best_actions
 from taichi_ants.errors import (
     AntsError,
     as_array,
@@ -207,7 +207,7 @@ class ColonyState:
         self.pheromones = task.pheromones_while(self.learns)
         self.memory, model = Memory(), self.model
         if model.learner is not None and (self.one_a_slot or model.plans_together):
-            self.memory = padded(model.learner.memory_for(self.training, task.n_states))
+            self.memory = model.learner.memory_for(self.training, task.n_states)
         self.arrays: Arrays = {}
         self.lay_out(worlds)
         self.arrays |= (lasting := self._lasting(table))

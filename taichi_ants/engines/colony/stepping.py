@@ -34,21 +34,17 @@ class ThreadChoice:
 
     def __init__(self) -> None:
         self._launches = 0
-        self._seconds_per_tick: dict[int, float] = {}  # by number of threads
+        self.seconds_per_tick: dict[int, float] = {}  # by number of threads
 
     def plan(self, ticks: int, most: int) -> tuple[int, int]:
         """Return the number of ticks for the next launch, and of threads, up to `most`."""
         if most == 1:
             return ticks, 1
         self._launches += 1
-        best, other = sorted((most, 1), key=lambda n: self._seconds_per_tick.get(n, math.inf))
+        best, other = sorted((most, 1), key=lambda n: self.seconds_per_tick.get(n, math.inf))
         if self._launches % _LAUNCHES_BETWEEN_PROBES == 2:
             return max(1, ticks // _LAUNCHES_BETWEEN_PROBES), other
         return ticks, best
-
-    def record(self, threads: int, seconds: float) -> None:
-        """Record the seconds per tick on a number of threads."""
-        self._seconds_per_tick[threads] = seconds
 
 
 class Stepper:
@@ -81,10 +77,17 @@ class Stepper:
             return
         interval = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
         interval = max(_FEWEST_TICKS, min(_MOST_TICKS, interval))
+        most = min(runtime.start().threads, runtime.available_threads(), state.chunks)
         while state.ticks < end:
             if state.ticks % interval == 0:
                 state.sort_ants()
-            self._share_ticks(state, min(end - state.ticks, interval - state.ticks % interval))
+            piece = min(end - state.ticks, interval - state.ticks % interval)
+            piece, threads = self.threads.plan(piece, most)
+            compiled, began = "ticks" in self._launches, time.perf_counter()
+            self._launch_ticks(state, piece, threads)
+            if compiled:
+                seconds = time.perf_counter() - began
+                self.threads.seconds_per_tick[threads] = seconds / piece
 
     def launch(self, state: ColonyState, name: str) -> None:
         """Launch a kernel by name: "ticks", or what ants do once, a function of `learning`."""
@@ -100,15 +103,6 @@ class Stepper:
                 kernel_of = partial(kernels.once, variant, getattr(learning, name))
             self._launches[name] = Launch(kernel_of)
         self._launches[name]({**kernel_numbers(state), **state.arrays})
-
-    def _share_ticks(self, state: ColonyState, n: int) -> None:
-        """Advance by up to n ticks, which threads share."""
-        n_threads = min(runtime.start().threads, runtime.available_threads(), state.chunks)
-        n, threads = self.threads.plan(n, n_threads)
-        compiled, began = "ticks" in self._launches, time.perf_counter()
-        self._launch_ticks(state, n, threads)
-        if compiled:
-            self.threads.record(threads, (time.perf_counter() - began) / n)
 
     def _launch_ticks(self, state: ColonyState, n: int, parts: int, threads: int = 1) -> None:
         """Advance by n ticks in one launch, and a second one if the first gave up at a barrier."""

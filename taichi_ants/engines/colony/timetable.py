@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import measures
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.engines.colony.stepping import Stepper, TickingColony
+from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.errors import AntsError
 from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
 
@@ -30,7 +30,6 @@ class Timetable:
         for number, event in enumerate(self._events):
             for tick in event.times(length):
                 self._at.setdefault(tick, []).append((number, event))
-        self._stops = sorted(self._at)
         self._measures = {
             event.measure: measures.get(event.measure)
             for event in self._events
@@ -47,16 +46,12 @@ class Timetable:
                 intervention.check_in(colony.worlds[0], colony.task, colony.learns)
 
     def __enter__(self) -> None:
-        if not self._events:
-            return
         colony = self._colony
         self._interventions = Interventions(colony, lasting=False)
         self._done: dict[int, np.ndarray] = {}  # by event: the worlds in which it has happened
         self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
 
     def __exit__(self, *_: object) -> None:
-        if not self._events:
-            return
         colony, (task, training, epsilon, learning_rate) = self._colony, self._before
         if colony.task != task:
             Interventions(colony, lasting=False).set_task(task)
@@ -64,15 +59,15 @@ class Timetable:
         if colony.learning_rate != learning_rate:
             colony.set_learning_rate(learning_rate)
 
-    def pieces(self, stepper: Stepper, n: int) -> Iterator[None]:
-        """Yield after each short launch until n ticks are done, with all events on the way."""
+    def pieces(self, advance: Callable[[Any, int], Iterator[None]], n: int) -> Iterator[None]:
+        """Yield when `advance` does, until n ticks are done, with all events on the way."""
         colony = self._colony
         end = colony.ticks + n
         while colony.ticks < end:
             for number, event in self._at.get(colony.ticks, ()):
                 self._happen(number, event)
-            stop = next((tick for tick in self._stops if tick > colony.ticks), end)
-            yield from stepper.pieces(colony, min(stop, end) - colony.ticks)
+            stop = min((tick for tick in self._at if colony.ticks < tick < end), default=end)
+            yield from advance(colony, stop - colony.ticks)
 
     def _happen(self, number: int, event: ProtocolEvent) -> None:
         """Let an event happen in the worlds that are running, if its condition holds there."""

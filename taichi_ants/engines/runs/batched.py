@@ -85,24 +85,18 @@ class BatchedEnvironments:
             self.arrays["start_cells"][which[here]] = cells
             self.arrays["start_headings"][which[here]] = headings
 
-    def begin(self, which: np.ndarray) -> None:
-        """Start an episode for the ants for which `which`, bool (n,), is True."""
-        self._go(np.where(which, Command.BEGIN, Command.WAIT))
-
     def step(
-        self, actions: np.ndarray, begins: np.ndarray | int = 0, same_step: bool = False
+        self,
+        actions: np.ndarray | int,
+        commands: np.ndarray | int = Command.STEP,
+        after_end: Command = Command.WAIT,
     ) -> None:
-        """Let all ants take these actions, except ants with `begins` 1, which start an episode."""
+        """Do a rollout of one step by commands (n,) to the ants, whose results are `arrays`."""
         self.arrays["taken"][:] = actions
-        self._go(begins, Command.STEP if same_step else Command.WAIT)
-
-    def _go(self, commands: np.ndarray | int, after_end: Command = Command.WAIT) -> None:
-        """Do a rollout of one step, whose results are `arrays`."""
         self.arrays["commands"][:] = commands
         self.arrays["after_end"] = int(after_end)
         with runtime.alone:
-            launch = self._launch(False, 0)
-            launch(self.arrays)
+            self._launch(False, 0)(self.arrays)
 
     def rollout(
         self,
@@ -129,9 +123,9 @@ class BatchedEnvironments:
         runtime.check_on_cpu(runtime.start(), "a rollout of a vector environment runs")
         launch = self._launch(policy is not None, shown[0].size)
         if self._codes is None:
-            from taichi_ants.engines.runs.rollout_kernel import size_of_codes
+            from taichi_ants.engines.runs.rollout_kernel import CODES_OF_CHUNK, WIDTH
 
-            self._codes = np.empty(size_of_codes(self.n), np.int64)
+            self._codes = np.empty(-(-self.n // WIDTH) * CODES_OF_CHUNK, np.int64)
         steps = max(1, _STEPS_OF_LAUNCH // self.n)
         values = {
             **self.arrays,

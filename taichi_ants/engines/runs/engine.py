@@ -26,7 +26,6 @@ from taichi_ants.engines.layout import (
     TRACE,
     compass_of,
     pack_cells,
-    padded,
 )
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state, words_of
@@ -68,12 +67,7 @@ class RunState(Record):
     learning_rate: np.ndarray
 
     @classmethod
-    def empty(
-        cls,
-        shape: tuple[int, ...],
-        n_states: int,
-        memory: Memory = Memory(),  # noqa: B008
-    ) -> RunState:
+    def empty(cls, shape: tuple[int, ...], n_states: int, memory: Memory) -> RunState:
         """Return a state of zeros for runs of this shape."""
         return cls(
             q=np.zeros((*shape, 1 + memory.tables, n_states, ROW), dtype=np.float32),
@@ -121,7 +115,7 @@ def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
     memories = [
         astuple(learners.get(config.learner).memory_for(config, n_states)) for config in configs
     ]
-    return padded(Memory(*np.max(memories, axis=0).tolist()))
+    return Memory(*np.max(memories, axis=0).tolist())
 
 
 def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]:
@@ -205,7 +199,7 @@ class Runs:
         epsilon: float,
     ) -> Runs:
         """Return runs that follow tables (n, n_states, 5) in the rollouts of these `numbers`."""
-        state = RunState.empty((len(tables),), task.n_states)
+        state = RunState.empty((len(tables),), task.n_states, Memory())
         state.q[:, 0, :, :N_ACTIONS] = tables
         state.epsilon[:] = epsilon
         words = np.array(seeds, dtype=object)
@@ -217,17 +211,12 @@ class Runs:
     def __len__(self) -> int:
         return len(self.seeds)
 
-    @property
-    def cells_of_a_run(self) -> int:
-        """The number of integers for the cells of a run."""
-        return self.world.grid.size + EXTRA_CELLS
-
     def compiled(self, traced: bool = False) -> Callable[..., None]:
         """Return a function (runs, episodes, **arrays), after compiling its kernel.
 
         It does some episodes of some runs, both slices, and writes the results into the arrays. All
         arrays of a launch are flat, one run after another. The sizes of a memory are multiples of
-        8, see `layout.padded`.
+        8, see `Learner.memory_for`.
         """
         # Imported here, because Taichi must be configured first; see `runtime`.
         from taichi_ants.engines.launch import Launch
@@ -259,7 +248,7 @@ class Runs:
                 "q": state.q[runs],
                 "floats": state.floats[runs],
                 "integers": state.integers[runs],
-                "cells": np.empty(n * self.cells_of_a_run, np.int32),
+                "cells": np.empty(n * (common["size"] + EXTRA_CELLS), np.int32),
                 "keeps_tables": 0,  # 1 to write the table after each step
                 "outcomes": np.zeros((0, 0, 0), np.int32),  # (3, n, n_episodes): `OUTCOMES`
                 "trace": np.zeros((0, 0), np.int32),  # (n * n_episodes * max_steps, `TRACE`)
@@ -291,8 +280,9 @@ class Runs:
         clock = time.process_time if settings.arch == "cpu" else time.perf_counter
         workers = settings.threads if settings.arch == "cpu" else _PARALLEL_RUNS_ON_GPU
         launch = self.compiled()
-        sizes = self.cells_of_a_run, max(array[0].size for array in vars(self.state).values())
-        size = size_of_launch(workers, episodes, self.max_steps, self.cost, *sizes)
+        cells = self.world.grid.size + EXTRA_CELLS
+        widest = max(array[0].size for array in vars(self.state).values())
+        size = size_of_launch(workers, episodes, self.max_steps, self.cost, cells, widest)
         seconds = 0.0
         for runs, part in pieces(len(self), episodes, *size, progress):
             block = np.empty_like(outcomes[:, runs, part], order="C")

@@ -34,14 +34,10 @@ WIDTH, LENGTH = 512, 64
 # Codes between the steps of an ant: with a power of two, all of them would compete for the same
 # lines of the cache.
 _STRIDE = WIDTH + 8
+CODES_OF_CHUNK = LENGTH * _STRIDE  # of `WIDTH` ants
 # A code is an i64: the state, and from these bits on the result of the step (`layout.TERMINATED`)
 # and the action.
 _RESULT, _ACTION = 32, 40
-
-
-def size_of_codes(n: int) -> int:
-    """Return the number of codes that the kernel needs for n ants."""
-    return -(-n // WIDTH) * LENGTH * _STRIDE
 
 
 @cache

@@ -261,14 +261,6 @@ def test_each_learner_and_observation_is_compared():
     assert {kernel[2] for kernel in KERNELS} == set(observations.names())
 
 
-def crowd(view):
-    """What stands in each of the six cells around: 0 no ant, 1 one without food, 2 one with it."""
-    index = 0
-    for k in range(6):
-        index = 3 * index + view.ants[k]
-    return index
-
-
 @pytest.fixture
 def seen_strangers(monkeypatch):
     """The observation, registered for one test."""
@@ -284,37 +276,6 @@ def strangers_seen(world, ant):
         other = world.ants.get(cell)
         index = 3 * index + (0 if other is None else 1 + (other.nest != ant.nest))
     return index
-
-
-@pytest.fixture
-def seen_crowd(monkeypatch):
-    """The observation, registered for one test."""
-    monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
-    return observations.register(Observation("crowd", 3**6, crowd, (-1, 0, 1, 2, 3, -2)))
-
-
-def test_ants_see_which_ants_stand_around_them_and_what_these_carry(seen_crowd):
-    """By a registered observation, after moves, pick-ups, gives, births and deaths."""
-    loads = np.zeros(3, dtype=int)
-    for seed in range(8):
-        drawn = random_colony(seed, sharing="frozen", dense=False, changes=True)
-        task = replace(drawn.task, observation="crowd")
-        given = (drawn.world, task, drawn.training, drawn.seed)
-        table = np.zeros((seen_crowd.n_states, 5), np.float32)  # any action, at random
-        colony = Colony(*given, **drawn.population, sharing="frozen", q_values=table)
-        colony.begin_episode()
-        for _ in range(15):
-            colony.tick()
-            living = colony.living
-            columns = (colony.cells, colony.headings, colony.states, colony.carrying)
-            ants = [column[living].tolist() for column in columns]
-            load = dict(zip(ants[0], ants[3], strict=True))
-            for cell, heading, row in zip(*ants[:3], strict=True):
-                steps = [colony.grid.offsets[(heading + k) % 6] for k in seen_crowd.cells]
-                seen = [1 + load[cell + step] if cell + step in load else 0 for step in steps]
-                assert row == int("".join(map(str, seen)), 3)
-                loads += np.bincount(seen, minlength=3)
-    assert (loads > 100).all()
 
 
 def test_errors_below_the_last_place_of_the_sum_are_rounded():

@@ -115,7 +115,7 @@ def test_every_tick_of_drawn_protocols_equals_the_reference(kernel):
                     twin.begin_episode()
                 with timetable:
                     for tick in range(TICKS):
-                        for _ in timetable.pieces(colony._stepper, 1):
+                        for _ in timetable.pieces(colony._stepper.pieces, 1):
                             pass
                         for w, (plain, twin) in enumerate(zip(plains, twins, strict=True)):
                             twin.before_tick()
@@ -225,7 +225,7 @@ WRONG = [
     (lambda: At(3, remove_ants=1.5), "`remove_ants.share` is 1.5; it must be between 0 and 1"),
     (lambda: At(3, remove_ants={"shar": 1}), "`remove_ants.shar` is not a setting; choose share"),
     (lambda: At(3, remove_ants={"number": 1, "share": 0.5}), "has number and share; give one of"),
-    (lambda: At(3, clear=[[1, 2]]), "a cell of `clear.cells` is [1, 2]; it must be three whole"),
+    (lambda: At(3, clear=[[1, 2]]), "`clear.cells` is [[1, 2]]; it must be a list of cells, each"),
     (lambda: At(3, move=[[1, 2, 0]]), "`move.cells` is ((1, 2, 0),); it must be the cell to"),
     (lambda: At(3, task="following"), "`at.task` is 'following'; it must be a table of settings"),
     (lambda: Every(5, stop=2, trail=0), "`every.stop` is 2, before the first event"),

@@ -13,14 +13,7 @@ from random_colonies import random_task
 from random_rewards import random_rewards
 from random_worlds import random_world
 
-from taichi_ants import (
-    TrainingConfig,
-    evaluate,
-    learners,
-    rollout,
-    trace_training,
-    train,
-)
+from taichi_ants import TrainingConfig, evaluate, learners, rollout, trace_training, train
 from taichi_ants.settings import declared
 from taichi_ants.task import Task, observations
 from taichi_ants.task.events import Event
@@ -47,8 +40,7 @@ NOISY = [
     pytest.param("expected_sarsa", "paper", "add", "greedy", NOISE, marks=pytest.mark.slow),
     pytest.param("sarsa_lambda", "trail_levels", "set", "greedy", "slip", marks=pytest.mark.slow),
     pytest.param(
-        *("dyna_q", "six_cells", "set", "softmax", "misread"),
-        marks=pytest.mark.optimised,
+        *("dyna_q", "six_cells", "set", "softmax", "misread"), marks=pytest.mark.optimised
     ),
 ]
 

@@ -9,7 +9,7 @@ from random_rewards import random_rewards
 from random_worlds import random_world
 
 from taichi_ants import Life, Pheromone, Task
-from taichi_ants.engines.layout import TERMINATED, TRUNCATED
+from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import GIVE, PICK_UP
@@ -94,7 +94,7 @@ def test_each_step_equals_the_reference(kernel):
         n, max_steps, seed = 3, int(rng.integers(2, 60)), int(rng.integers(2**60))
         ants = BatchedEnvironments([world], task, n, max_steps, ends, falls)
         ants.seed(range(seed, seed + n), np.arange(n))
-        ants.begin(np.ones(n, bool))
+        ants.step(0, Command.BEGIN)
         colonies = [plain(world, task, seed + i, ends, falls) for i in range(n)]
         for colony in colonies:
             colony.begin_episode()
@@ -103,7 +103,8 @@ def test_each_step_equals_the_reference(kernel):
         for _ in range(60):
             paper_states = arrays["paper_states"].tolist()
             actions = [sensible(rng, paper_state) for paper_state in paper_states]
-            ants.step(np.array(actions), begins & (not same_step), same_step)
+            after_end = Command.STEP if same_step else Command.WAIT
+            ants.step(np.array(actions), begins & (not same_step), after_end)
             for i, colony in enumerate(colonies):
                 if begins[i] and not same_step:
                     colony.begin_episode()
@@ -161,7 +162,7 @@ BEFORE_QUEEN = """
 def test_reasons_say_why_nothing_happened(drawing, actions, reasons):
     ants = BatchedEnvironments([from_text(drawing)], Task(), 1, 100, "continues", falls=False)
     ants.seed([0], np.arange(1))
-    ants.begin(np.ones(1, bool))
+    ants.step(0, Command.BEGIN)
     told = []
     for action in actions:
         ants.step(np.array([action]))

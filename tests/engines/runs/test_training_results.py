@@ -59,11 +59,7 @@ def test_what_was_loaded_goes_on_bit_for_bit(result, tmp_path):
     [
         ("state_integers", np.zeros((2, 2, 6488), np.int32), "integers of a result is an array"),
         ("state_q", np.zeros((2, 3, 1, 432, 5), np.float32), "q of a result is an array"),
-        (
-            "returns",
-            None,
-            "damaged (KeyError: 'returns'); name a file that",
-        ),
+        ("returns", None, "damaged (KeyError: 'returns'); name a file that"),
     ],
 )
 def test_damaged_arrays(stored, tmp_path, name, value, said):
