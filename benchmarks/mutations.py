@@ -235,7 +235,12 @@ MUTATIONS = [
     ("engines/colony/interventions.py", "epsilon_decay=1.0, min", "min", SESSION),
     ("engines/colony/interventions.py", "numbers < colony.ants ", "numbers < 0 ", EDITS),
     # Protocols.
-    ("engines/colony/timetable.py", "tick > colony.ticks", "tick > colony.ticks + 1", PROTOCOL),
+    (
+        "engines/colony/timetable.py",
+        "colony.ticks < tick < end",
+        "colony.ticks + 1 < tick < end",
+        PROTOCOL,
+    ),
     ("engines/colony/timetable.py", "~(done & event.once)", "~done", PROTOCOL),
     ("engines/colony/timetable.py", "        done |= worlds", "        done &= worlds", PROTOCOL),
     ("engines/colony/interventions.py", "nest)) + 0.5)", "nest)))", PROTOCOL),
@@ -377,7 +382,7 @@ MUTATIONS = [
     ("settings.py", "converted <= above", "converted < above", SETTINGS),
     ("settings.py", "elif value != setting.default:", "elif False:", SETTINGS),
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
-    ("settings.py", "changed[setting.name] = setting.default", "pass", SETTINGS),
+    ("settings.py", "changes[name] = setting.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
     # Features, and what supports them.
     ("features/support.py", ".intersection(supports):", ":", FEATURES),
@@ -392,7 +397,7 @@ MUTATIONS = [
     ("analysis/sensitivity.py", '"seed": RANDOM_SEED', '"seed": 0', SENSITIVITY),
     # Archives of studies, and descriptions of models.
     ("studies/archive.py", "> MOST_BYTES:", "> 2 * MOST_BYTES:", ARCHIVE),
-    ("commands/reproduce.py", "sum(bool(difference) for", "0 * sum(bool(difference) for", ARCHIVE),
+    ("commands/reproduce.py", "sum(map(bool, found", "0 * sum(map(bool, found", ARCHIVE),
     ("commands/reproduce.py", "if not settings.trust_code:", "if False:", ARCHIVE),
     ("files/inputs.py", "return copy or path", "return path", ARCHIVE),
     ("report/odd.py", 'return row.get(f"{group}.{other}") in needed', "return True", ODD),

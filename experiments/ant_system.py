@@ -25,8 +25,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.grid.randomness import stream_state
     from taichi_ants.settings import Count, Seed, Setting, checked_arguments
     from taichi_ants.studies.command_line import (
-        THREADS,
         Parser,
+        add_threads,
         progress_bar,
         run_command,
         whole_number,
@@ -278,7 +278,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     evaporation = "share that evaporates per iteration (default: 0.5; for MAX-MIN, 0.02)"
     add("--evaporation", type=float, metavar="RHO", help=evaporation)
     add("--seed", type=whole_number(), default=0, metavar="N", help="seed of all colonies")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
+    add_threads(parser)
     return parser.parse_args(arguments)
 
 

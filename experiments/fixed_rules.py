@@ -30,8 +30,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.analysis.statistics import bootstrap_interval
     from taichi_ants.learners.policies import FOLLOWED, RULES, trail_follower
     from taichi_ants.studies.command_line import (
-        THREADS,
         Parser,
+        add_threads,
         progress_bar,
         run_command,
         whole_number,
@@ -83,7 +83,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--epsilon", type=float, nargs="+", default=[0.0, 0.01], metavar="X", help=epsilons)
     study = "results folder of colony.py study to compare with"
     add("--study", type=Path, metavar="FOLDER", help=study)
-    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
+    add_threads(parser)
     return parser.parse_args(arguments)
 
 

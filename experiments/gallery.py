@@ -2,9 +2,8 @@
 
 The scripts `render.py`, `learning.py` and `policy_sheet.py` draw the pictures in `renders/`. The
 pictures in `docs/figures/` show the results in `results/compare`, `results/colony` and
-`results/bridge`, and a run of a million ants. If results are missing, the script runs the study
-first. The comparison takes less than a minute on two cores; see docs/colony_study.md and
-docs/bridge.md for the other two.
+`results/bridge`. If results are missing, the script runs the study first. The comparison takes less
+than a minute on two cores; see docs/colony_study.md and docs/bridge.md for the other two.
 """
 
 from __future__ import annotations
@@ -68,15 +67,9 @@ FIGURES = {
     "colony_scaling.png": "colony/figures/scaling.png",
     "colony_training.png": "colony/figures/training.png",
     "colony_elsewhere.png": "colony/figures/elsewhere.png",
-    "million.png": "million.png",
     "bridge.png": "bridge/figures/bridge.png",
     "bridge_late.png": "bridge/figures/late.png",
 }
-_QUEUEING = str(ROOT / "experiments" / "policies" / "queueing.npz")
-MILLION = [
-    *("live", "--policy", _QUEUEING, "--sharing", "frozen", "--training.epsilon", "0.01"),
-    *("--ants", "64", "--colonies", "15625", "--world.ranges", "30", "30", "30", "--ticks", "300"),
-]
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -211,7 +204,7 @@ def _keep(picture: bytes, path: Path) -> None:
 
 
 def make_figures(folder: Path) -> None:
-    """Copy figures of the studies and of a million ants, after running missing studies.
+    """Copy figures of the studies, after running missing studies.
 
     They have 256 colours, so that their history in Git stays small.
     """
@@ -220,14 +213,12 @@ def make_figures(folder: Path) -> None:
     import compare
     from PIL import Image
 
-    from taichi_ants.commands import colony as command
     from taichi_ants.studies.command import planned, run_study
 
     results = ROOT / "results"
     for script, words in ((compare, ()), (colony, ("study",)), (bridge, ())):
         settings = script.parse_arguments([*words, "--out", str(results / script.__name__)])
         run_study(settings, planned(script.__file__, settings))
-    command.run(command.parse_arguments([*MILLION, "--figure", str(results / "million.png")]))
     folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
         with Image.open(results / source) as image:

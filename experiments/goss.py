@@ -22,7 +22,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.grid.constants import STREAM_BRIDGE
     from taichi_ants.grid.randomness import stream_state
     from taichi_ants.settings import Count, Seed, Setting, checked_arguments
-    from taichi_ants.studies.command_line import THREADS, Parser, run_command, whole_number
+    from taichi_ants.studies.command_line import Parser, add_threads, run_command, whole_number
 
 # Percent of colonies for each ratio r of the branches, by the share of ants on the short branch:
 # 0-20 %, 20-40 %, 40-60 %, 60-80 %, 80-100 %.
@@ -153,7 +153,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     number = whole_number(4, 10_000_000)
     add("--choices", type=number, default=AS_PUBLISHED, metavar="N", help=chosen)
     add("--seed", type=whole_number(), default=0, metavar="N", help="seed of all colonies")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
+    add_threads(parser)
     return parser.parse_args(arguments)
 
 

@@ -141,7 +141,7 @@ def learning_frames(
     room = width - 2 * letters
     text.write(canvas, title, width / 2, 1.5 * letters, letters, align="middle", room=room)
     if letters:
-        draw_legend(canvas, bottom, letters, checkpoints[0].episode.arguments.task.rewards)
+        draw_legend(canvas, bottom, letters, checkpoints[0].episode.trace.arguments.task.rewards)
     columns = math.ceil(len(checkpoints) / max(1, math.isqrt(len(checkpoints) * height // width)))
     more = _MORE_LINES * any(checkpoint.among for checkpoint in checkpoints)
     rows, lines = math.ceil(len(checkpoints) / columns), round((_TILE_LINES + more) * letters)
@@ -149,7 +149,7 @@ def learning_frames(
     # Not higher than wide, so that each title is close to its world.
     h = min((bottom - top) // rows, w + lines)
     top += (bottom - top - rows * h) // 2
-    grid, margin = checkpoints[0].episode.arguments.world.grid, max(2, round(min(w, h) / 60))
+    grid, margin = checkpoints[0].episode.trace.arguments.world.grid, max(2, round(min(w, h) / 60))
     rasteriser = Rasteriser(grid, w, max(1, h - lines), margin)
     tiles = [tile_pictures(checkpoint, rasteriser, h, letters, more) for checkpoint in checkpoints]
     for present in zip_longest(*tiles):

@@ -20,7 +20,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
     from taichi_ants.grid.hexgrid import centre_of
     from taichi_ants.learners.policies import checked_table
-    from taichi_ants.rendering import check_picture, colours, save_picture, text
+    from taichi_ants.rendering import colours, save_picture, text
     from taichi_ants.rendering.colours import Mark
     from taichi_ants.rendering.rasteriser import (
         CELL_LETTERS,
@@ -31,6 +31,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
         marks,
     )
     from taichi_ants.rendering.scene import fill, name_parts
+    from taichi_ants.rendering.writers import check_file
     from taichi_ants.studies.command_line import Parser, given_world, run_command
     from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import Observation, Task
@@ -218,7 +219,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def show(settings: argparse.Namespace) -> None:
     """Write the sheet, and print a summary."""
-    check_picture(settings.out)
+    check_file(settings.out, "one picture", ".png")
     load_plugin(settings.plugin)
     q_values, task, title = render.find_policy(settings, given_world(settings))
     save_picture(settings.out, policy_sheet(q_values, title, task=task))

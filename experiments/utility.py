@@ -30,8 +30,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.grid.randomness import stream_state
     from taichi_ants.settings import Count, Seed, Setting, Share, checked_arguments
     from taichi_ants.studies.command_line import (
-        THREADS,
         Parser,
+        add_threads,
         progress_bar,
         run_command,
         whole_number,
@@ -276,7 +276,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     }
     for flag, (default, words) in shares.items():
         add(flag, type=float, default=default, metavar="X", help=words)
-    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
+    add_threads(parser)
     return parser.parse_args(arguments)
 
 

@@ -12,7 +12,6 @@ from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features import FEATURES
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.records import Snapshot
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.rules import Rule
 from taichi_ants.settings import declared
@@ -212,22 +211,16 @@ def _difference(colony: Colony, plain: ReferenceColony) -> str:
         "actions": (colony.actions[0, order], [ant.action for ant in ants]),
         "events": (colony.events[0, order], [ant.event for ant in ants]),
         "rewards": (colony.rewards[0, order], [ant.reward for ant in ants]),
-        **{f"levels of {name}": levels for name, levels in _levels(ours, plain).items()},
-        "action values": (colony.q_values[0], plain.q_values),
     }
+    ground = list(plain.world.ground)
+    places = grid.index(np.array(ground, np.int64).reshape(-1, 3))
+    for name, trail in plain.world.pheromones.items():
+        levels = [trail.level(cell) for cell in ground]
+        pairs[f"levels of {name}"] = ours.fields[name][places], levels
+    pairs["action values"] = colony.q_values[0], plain.q_values
     for what, (kernel, twin) in pairs.items():
         expected = np.asarray(twin).astype(kernel.dtype)
         if not np.array_equal(kernel, expected):
             at = np.unravel_index(np.argmax(kernel != expected), kernel.shape)
             return f"{what} are {kernel[at]} in kernels, but {expected[at]} in the reference"
     return ""
-
-
-def _levels(ours: Snapshot, plain: ReferenceColony) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return the levels of each pheromone in all cells: those of kernels, and of the reference."""
-    cells = list(plain.world.ground)
-    places = ours.grid.index(np.array(cells, np.int64).reshape(-1, 3))
-    return {
-        name: (ours.fields[name][places], np.array([trail.level(cell) for cell in cells]))
-        for name, trail in plain.world.pheromones.items()
-    }

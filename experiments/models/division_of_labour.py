@@ -56,7 +56,7 @@ def measure(seeds):
         axes.set(xlabel="tick", ylabel="share of foragers", ylim=(0, 1))
 
     title = "Share of the ants that forage, by the demand of the nest"
-    return model_script.Results(numbers, summary, title, draw)
+    return numbers, summary, title, draw
 
 
 if __name__ == "__main__":

@@ -41,7 +41,7 @@ def measure(seeds):
         axes.set(xlabel="episode", ylabel=f"deliveries in {TICKS} ticks", ylim=(0, None))
 
     title = "Deliveries of ants with a compass, a second trail, or neither"
-    return model_script.Results(numbers, summary, title, draw)
+    return numbers, summary, title, draw
 
 
 if __name__ == "__main__":

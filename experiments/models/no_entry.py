@@ -169,7 +169,7 @@ def measure(seeds: list[int]) -> model_script.Results:
         axes.set(xlabel="tick", ylabel="food items delivered", ylim=(0, None))
 
     title = "Deliveries on a decision tree, by where a no-entry pheromone is laid"
-    return model_script.Results(numbers, summary, title, draw)
+    return numbers, summary, title, draw
 
 
 if __name__ == "__main__":

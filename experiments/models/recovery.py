@@ -49,7 +49,7 @@ def measure(seeds):
         axes.set(xlabel="tick", ylabel="living ants", ylim=(0, None))
 
     title = "Ants of a colony from which a share is removed after 2000 ticks"
-    return model_script.Results(numbers, summary, title, draw)
+    return numbers, summary, title, draw
 
 
 if __name__ == "__main__":

@@ -57,7 +57,7 @@ def measure(seeds):
         axes.set(xlabel="tick", ylabel="share of the first nest", ylim=(0, 1))
 
     title = "Part of the loads that the first of two nests has delivered"
-    return model_script.Results(numbers, summary, title, draw)
+    return numbers, summary, title, draw
 
 
 if __name__ == "__main__":

@@ -9,18 +9,15 @@ like an interaction of all settings, so `seed_share` gives its size.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis import style
 from taichi_ants.analysis.statistics import RANDOM_SEED, all_equal, known_means
 from taichi_ants.analysis.sweeps import short
-from taichi_ants.analysis.tables import Table, interval, number, percent, plain_text, sentence
+from taichi_ants.analysis.tables import Table, interval, number, percent, plain_text
 
 RESAMPLES = 1000
-_WIDTH = 120
 
 
 class Index(NamedTuple):
@@ -90,57 +87,21 @@ def report(indices: Mapping[str, Sequence[Index]], seeds: int) -> str:
     blocks: list[str | Table] = []
     for measure, rows in indices.items():
         if not rows:
-            words = f"{measure} has no indices: it has values at too few points, or is constant."
-            blocks.append(words)
+            words = "has no indices: it has values at too few points, or is constant."
+            blocks.append(f"{measure} {words}")
             continue
-        names = [row.setting for row in rows]
         lines = [
             [
-                short(name, names),
-                f"{number(first, 2)} {interval(first_low, first_high, 2)}",
-                f"{number(total, 2)} {interval(low, high, 2)}",
+                short(row.setting, [other.setting for other in rows]),
+                f"{number(row[2], 2)} {interval(*row[3:5], 2)}",
+                f"{number(row[5], 2)} {interval(*row[6:8], 2)}",
             ]
-            for _, name, first, first_low, first_high, total, low, high, *_ in sorted(
-                rows, key=lambda row: -row.total
-            )
+            for row in sorted(rows, key=lambda row: -row.total)
         ]
-        notes = [_noise(rows[0], seeds)]
-        blocks.append(Table("", [measure, "first order", "total"], lines, notes))
-    return plain_text(blocks, _WIDTH)
-
-
-def _noise(row: Index, seeds: int) -> str:
-    share, without = percent(row.seed_share), row.left_out
-    more = f" {without} points are left out, because one of their group has no value."
-    noise = f"Means over {seeds} seeds; seeds make {share} of their variance, in each total index."
-    return noise + more * bool(without)
-
-
-def draw(path: Path, rows: Sequence[Index], words: str, seeds: int) -> None:
-    """Draw the indices of a measure, called `words`, as bars, the largest total index on top.
-
-    Raises:
-        AntsError: The file (.png) cannot be written.
-    """
-    rows = sorted(rows, key=lambda row: row.total)
-    names, y = [row.setting for row in rows], np.arange(len(rows))
-    with style.styled():
-        figure = style.new_figure(1.6 + 0.34 * len(rows))
-        axes = figure.subplots()
-        for first, shift, colour, label in (
-            (2, 0.2, style.ORANGE, "First order: alone"),
-            (5, -0.2, style.BLUE, "Total: also together with others"),
-        ):
-            value, low, high = np.array([row[first : first + 3] for row in rows]).T
-            axes.barh(y + shift, value, 0.36, color=colour, label=label)
-            axes.hlines(y + shift, low, high, color=style.INK, linewidth=1)
-        share = rows[0].seed_share
-        axes.axvline(share, color=style.GREY, linestyle="--", linewidth=1, label="Share of seeds")
-        axes.axvline(0, color=style.INK, linewidth=0.8)
-        axes.set_yticks(y, [short(name, names) for name in names])
-        axes.grid(visible=False, axis="y")
-        axes.set_xlabel(f"Share of the variance of {words}")
-        caption = f"95 % intervals by SALib's bootstrap. {_noise(rows[0], seeds)}"
-        title = f"{sentence(words)}: sensitivity indices"
-        style.frame(figure, title, caption, style.legend_entries([axes]))
-    style.save(figure, path)
+        share, left_out = percent(rows[0].seed_share), rows[0].left_out
+        note = f"Means over {seeds} seeds; seeds make {share} of their variance, in each total "
+        note += "index."
+        if left_out:
+            note += f" {left_out} points are left out, because one of their group has no value."
+        blocks.append(Table("", [measure, "first order", "total"], lines, [note]))
+    return plain_text(blocks, 120)

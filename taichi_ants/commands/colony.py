@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 _LEARNING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0)  # the default
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
-_FILES = ("save", "render", "figure")
-_OF_RESUMED = ("resume", "ticks", "frame_interval", "plugin", "threads", "arch", *_FILES)
+_OF_RESUMED = ("resume", "ticks", "frame_interval", "plugin", "threads", "arch", "save", "render")
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -65,8 +64,6 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     picture = "draw the last tick (.png), or an animation (.gif)"
     add("--render", metavar="PATH", help=picture)
     add("--frame-interval", **COUNT, default=2, help="ticks per frame of an animation")
-    figure = "plot the deliveries per tick of all colonies together (.png), with the numbers (.csv)"
-    add("--figure", metavar="FILE.png", help=figure)
     command_line.add_common(parser)
     parser.open_settings = ("world", "task", "training")
     command_line.add_settings(parser, queueing())
@@ -90,7 +87,7 @@ def run(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.one_colony import check_places, live, summary
 
     load_plugin(settings.plugin)
-    files = settings.save, settings.render, settings.figure
+    files = settings.save, settings.render
     check_places(*files)
     if settings.resume:
         colony = Colony.load(settings.resume, settings.threads, arch=settings.arch)

@@ -75,10 +75,7 @@ OPTIONS: dict[str, tuple[str, dict[str, Any]]] = {
     "--size": ("width and height in pixels", {"type": _size, "metavar": "WxH"}),
     "--fps": ("frames per second", {**_NUMBER, "default": 8.0}),
     "--frame-interval": ("ticks per frame (default: 4; for a page, 1)", _COUNT),
-    "--no-overlay": (
-        "render only the world, without the panel and the marks of the view",
-        _PLAIN,
-    ),
+    "--no-overlay": ("render only the world, without the panel and the marks of the view", _PLAIN),
 }
 _LONE, _MANY = {"--max-steps"}, {"--ants", "--follow", "--ticks", "--frame-interval"}
 _OF_TRAINING = ("--episodes", "--training.", "--task.")  # unused with --policy

@@ -26,8 +26,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--out", type=Path, metavar="FOLDER", help=place)
     trust = "run the Python code in the archive: plugins, and the module of the study"
     add("--trust-code", action="store_true", help=trust)
-    number = command_line.whole_number(1, 1024)
-    add("--threads", type=number, metavar="N", help=command_line.THREADS)
+    command_line.add_threads(parser)
     command_line.add_machines(parser)
     return parser.parse_args(arguments)
 
@@ -43,7 +42,7 @@ def run(settings: argparse.Namespace) -> None:
     with archive.unpacked(settings.file) as path:
         manifest = archive.finished(path)
         if code := sorted(path.glob(f"{folder.INPUTS}/*/**/*.py")):
-            names = ", ".join(f"{archive.RESULTS}/{file.relative_to(path)}" for file in code)
+            names = ", ".join(f"results/{file.relative_to(path)}" for file in code)
             if not settings.trust_code:
                 raise AntsError(
                     f"the study runs code of the archive, {names}; read it, for example with "
@@ -55,13 +54,12 @@ def run(settings: argparse.Namespace) -> None:
         with opened(path) as planned:
             more = {"no_figures": not manifest["figures"], "parquet": manifest["parquet"]}
             more |= {"out": out, "force": False, "arch": planned.facts["arch"]}
-            if not run_study(argparse.Namespace(**vars(settings) | more), planned):
+            if not run_study(argparse.Namespace(**vars(settings) | more), planned, report=False):
                 return
-        compared = list(archive.compare(path, out))
-    for name, difference, note in compared:
-        words = f"({difference or note})" if difference or note else ""
-        print(f"{'DIFFERENT' if difference else 'equal':9}  {name} {words}".rstrip())
-    if different := sum(bool(difference) for _, difference, _ in compared):
-        print(f"{different} of {len(compared)} files differ: the study is not reproduced.")
+        found = dict(archive.differences(path, out))
+    for name, words in found.items():
+        print(f"DIFFERENT  {name} ({words})" if words else f"equal      {name}")
+    if different := sum(map(bool, found.values())):
+        print(f"{different} of {len(found)} files differ: the study is not reproduced.")
         sys.exit(1)
-    print(f"All {len(compared)} files are equal: the study is reproduced.")
+    print(f"All {len(found)} files are equal: the study is reproduced.")

@@ -21,13 +21,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.settings import flat
-from taichi_ants.studies.command_line import (
-    PLUGIN,
-    THREADS,
-    Parser,
-    progress_bar,
-    whole_number,
-)
+from taichi_ants.studies.command_line import PLUGIN, Parser, add_threads, progress_bar, whole_number
 from taichi_ants.studies.interruption import held
 from taichi_ants.studies.plugins import load_plugin
 from taichi_ants.task import Life, queueing
@@ -67,18 +61,14 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     offered = "policy files (.npz) to offer on the page, in addition to experiments/policies/"
     add("--policy", **files, help=offered)
     add("--session", metavar="FILE", help="resume a saved session")
-    add(
-        "--port",
-        type=whole_number(0, 65535),
-        default=0,
-        metavar="N",
-        help="port of the page; 0 picks a free one",
-    )
+    port = whole_number(0, 65535)
+    free = "port of the page; 0 picks a free one"
+    add("--port", type=port, default=0, metavar="N", help=free)
     closed = "do not open a browser (the default if the output is not a terminal)"
     add("--no-browser", action="store_true", help=closed)
     add("--duration", type=whole_number(1), metavar="N", help="end after N seconds")
     add("--plugin", metavar="FILE", help=PLUGIN)
-    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
+    add_threads(parser)
     settings = parser.parse_args(arguments)
     if (settings.folder is None) != (settings.row is None):
         parser.error("FOLDER and --row belong together, so give both or neither")

@@ -191,28 +191,23 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
 
     Environment number w * ants + i is ant number i of world number w. The ants of a world share its
     cells, its food and its trails, and act at the same time. A library that trains one agent on a
-    vector environment therefore trains one policy for all ants ("parameter sharing"). Actions,
-    observations and rewards are those of `HexForageEnv`, and infos are those of
-    `HexForageVectorEnv` except `reason`. Each ant gets the reward of its own action. Its mask is 1
-    for actions that succeed unless another ant comes first.
+    vector environment therefore trains one policy for all ants ("parameter sharing"). Spaces,
+    rewards of an ant's own action, and infos except `reason` are those of `HexForageVectorEnv`; its
+    mask is 1 for actions that succeed unless another ant comes first.
 
-    ## Episode End
-    After `max_steps` steps, all ants of a world are truncated. A delivery does not reset the world,
-    and its ant continues from its cell. If the task's `delivery` is "terminates", the default, the
-    ant is nevertheless `terminated` and its next observation begins its next episode, so that later
-    rewards do not count for the delivery. This requires the autoreset mode `SAME_STEP`, because the
-    next episode begins in the same step. If `delivery` is "truncates", no ant is terminated, and
-    all modes are possible. All modes reset whole worlds.
+    After `max_steps` steps, all ants of a world are truncated, and all autoreset modes reset whole
+    worlds. A delivery does not reset the world, and its ant continues from its cell. If the task's
+    `delivery` is "terminates", the default, the ant is nevertheless `terminated` and its next
+    observation begins its next episode, so that later rewards do not count for the delivery. This
+    requires the mode `SAME_STEP`, because the next episode begins in the same step. If `delivery`
+    is "truncates", no ant is terminated, and all modes are possible.
 
     ## Arguments
     - `num_envs`: The number of ants in all worlds together, a multiple of `ants`.
-    - `world`: See `HexForageEnv`; or a list of n worlds with the same ranges, of which world number
-    w is entry w modulo n.
-    - `task`: See `HexForageEnv`; without births and lifespan.
     - `ants`: The number of ants in each world.
-    - `start`, `max_steps`, `observation_format`: See `HexColonyParallelEnv`.
-    - `autoreset_mode`, `max_episode_steps`: See `HexForageVectorEnv`.
-    - `render_mode`: "rgb_array" for a picture of each ant's world, or None.
+    - `task`: See `HexForageEnv`; without births and lifespan.
+    - `start`, `max_steps`: See `HexColonyParallelEnv`.
+    - All others: See `HexForageVectorEnv`; `render` draws each ant's world.
     """
 
     metadata = METADATA

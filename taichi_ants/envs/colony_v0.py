@@ -30,28 +30,22 @@ class HexColonyParallelEnv(ParallelEnv):
 
     Agent `"ant_7"` is ant number 7. The ants that start an episode have the numbers 0, 1, ... Each
     ant that is born gets the next number, is in `agents` from its birth, and acts from the next
-    step. All agents act at once. Actions, observations and rewards are those of `HexForageEnv`.
-    Each ant gets the reward of its own action. `state()` is a map of the whole world, for
-    centralised critics.
+    step. All agents act at once. Spaces, rewards of an ant's own action, and infos except `reason`
+    are those of `HexForageEnv`. `action_mask` is 1 for actions that succeed unless another ant
+    comes first, and `event` is also NONE in the step of an ant's birth. `state()` is a map of the
+    whole world, for centralised critics.
 
-    ## Episode End
     An ant that dies of age is terminated and leaves `agents`; its number is not used again. After
     `max_steps` steps, all ants are truncated. A delivery does not end the episode, for any
     `delivery` of the task: the ant continues, and `info["event"]` is DELIVERED.
 
-    ## Info
-    Infos are those of `HexForageEnv` except `reason`. `action_mask` is 1 for actions that succeed
-    unless another ant comes first. `event` is also NONE in the step of an ant's birth.
-
     ## Arguments
-    - `world`, `task`: See `HexForageEnv`.
     - `ants`: The number of ants at the start.
     - `start`: "nest" for cells near the queen, or "spread" for any cells.
     - `capacity`: The largest number of living ants; by default, `ants`, or 2 * `ants` + 64 if the
       task has births.
     - `max_steps`: The number of steps of an episode.
-    - `observation_format`: "cells", "index" or "one_hot".
-    - `render_mode`: "rgb_array" for pictures, or None.
+    - All others: See `HexForageEnv`.
 
     Attributes:
         possible_agents: All agents that can live in an episode: the ants at the start and those

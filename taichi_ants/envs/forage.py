@@ -30,19 +30,11 @@ from taichi_ants.envs.vector import (
 )
 from taichi_ants.errors import check_one_of, checked_whole, shown
 from taichi_ants.features.support import CHOICE, LONE
-from taichi_ants.records import Snapshot
-from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
-from taichi_ants.worlds import text_map
+from taichi_ants.task.constants import EPISODE_STEPS, N_ACTIONS
 
 SUPPORTS = LONE - CHOICE - {"choice.rule=softmax"}  # actions are given
 DELIVERIES = ("terminates", "truncates", "continues")
-METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "ansi"], "render_fps": 10}
-_GROUNDS = {
-    EMPTY: text_map.EMPTY,
-    OBSTACLE: text_map.OBSTACLE,
-    FOOD: text_map.FOODS[0],
-    QUEEN: text_map.QUEENS[0],
-}
+METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
 # The command to an ant after the last step of an episode.
@@ -69,7 +61,6 @@ class LoneAnts(Ants):
         check_one_of("delivery", delivery, DELIVERIES)
         most = _MOST_CELLS // self.worlds[0].grid.size
         checked_whole("num_envs", n, 1, most, " for a world of this size")
-        self._text = arguments.render_mode == "ansi"
         self.batched = BatchedEnvironments(
             self.worlds, task, n, self.max_steps, delivery, task.evaporation_in_training
         )
@@ -121,7 +112,7 @@ class LoneAnts(Ants):
         }
 
     def draw(self, world: int) -> Any:
-        """Return a picture of an ant's world, uint8 (720, 1280, 3), or a text map."""
+        """Return a picture of an ant's world, uint8 (720, 1280, 3)."""
         arrays, sees = self.batched.arrays, self.task.sees
         now, state = self.batched.snapshot(world), int(arrays["states"][world])
         facts = (
@@ -129,8 +120,6 @@ class LoneAnts(Ants):
             ("reward", f"{arrays['rewards_of'][world]:g}"),
             ("state", sees.name_of(state)),
         )
-        if self._text:
-            return f"; {', '.join(map(' '.join, facts))}\n{_text_of(now)}"
         from taichi_ants import rendering
 
         if self._scene is None:
@@ -138,41 +127,26 @@ class LoneAnts(Ants):
         return self._scene.draw(now, rendering.Status(facts, state, observation=sees))
 
 
-def _text_of(now: Snapshot) -> str:
-    """Return a text map, see `worlds.text_map`; the heading of the ant marks its cell."""
-    marked = [(now.grid.exists & (now.ground == kind), mark) for kind, mark in _GROUNDS.items()]
-    marked.append(((now.trail > 0) & (now.ground == EMPTY), text_map.TRAIL))
-    marks = [(now.grid.cells(np.flatnonzero(cells)), mark) for cells, mark in marked]
-    on_trail = now.trail[now.ant_cells[0]] > 0
-    letters = text_map.ANTS_ON_TRAIL if on_trail else text_map.ANTS
-    marks.append((now.grid.cells(now.ant_cells), letters[now.ant_headings[0]]))
-    return text_map.drawing(now.grid.ranges, marks)
-
-
 class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
     """An ant on a hexagonal grid that searches for food and carries it to its queen.
 
-    The rules are those of "Ants and Reinforcement Learning Algorithms". See
-    `docs/environments_reference.md`.
+    The rules are those of "Ants and Reinforcement Learning Algorithms"; see
+    `docs/environments_reference.md`, also for what codes in observations mean.
 
-    ## Observation Space
+    ## Spaces
     Observations have k parts of sizes p1, ..., pk, which depend on the task. The paper's have the
-    sizes (2, 4, 4, 4): the load, then a code for each of the cells left, forward and right. Codes
-    are 0 (empty), 1 (obstacle), 2 (trail) and 3 (food) for an ant without food. For an ant with
-    food, 2 is a cell nearer to the queen, and 3 is the queen.
+    sizes (2, 4, 4, 4): the load, then a code for each of the cells left, forward and right.
 
     - "cells": `MultiDiscrete([p1, ..., pk])`, int64 (k,).
     - "index": `Discrete(p1 * ... * pk)`, the state index.
     - "one_hot": `Box(0, 1, (p1 + ... + pk,), float32)`, each part one-hot.
 
-    ## Action Space
-    `Discrete(5)`. 0, 1 and 2 turn the ant to the cell left, forward or right and enter it. 3 picks
-    up food in view, and 4 gives the food to the queen in view. A blocked move still turns the ant.
+    Actions are `Discrete(5)`: 0, 1 and 2 turn the ant to the cell left, forward or right and enter
+    it, 3 picks up food in view, and 4 gives it to the queen in view. A blocked move still turns.
 
     ## Info
     - `state`: int64, the state index.
-    - `action_mask`: int8 (5,), 1 for actions that can succeed; in a dead end, 1 for the moves,
-      which turn the ant. `action_masks()` returns it as bool, for MaskablePPO of sb3-contrib.
+    - `action_mask`: int8 (5,), 1 for actions that can succeed; in a dead end, for the moves.
     - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset`.
     - `reason`: int64, the reason why the action failed, a `taichi_ants.envs.Reason`, or NONE.
     - `deliveries`: int64, the deliveries of this episode. Report them beside the return, because
@@ -185,8 +159,7 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
     - `delivery`: "terminates", "truncates" or "continues" the episode; by default, the task's.
     - `max_steps`: The number of steps after which an episode is truncated.
     - `observation_format`: "cells", "index" or "one_hot".
-    - `render_mode`: "rgb_array" for pictures, uint8 (720, 1280, 3), or "ansi" for text maps, in
-      which the heading of the ant marks its cell.
+    - `render_mode`: "rgb_array" for pictures, uint8 (720, 1280, 3), or None.
     """
 
     metadata = METADATA
@@ -253,12 +226,12 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
         }
 
     def action_masks(self) -> np.ndarray:
-        """Return the actions that can succeed now, bool (5,): `info["action_mask"]` as bool."""
+        """Return `info["action_mask"]` as bool (5,), for MaskablePPO of sb3-contrib."""
         self._check_begun("action_masks()")
         return ACTION_MASKS[self._arrays["paper_states"][0]].astype(bool)
 
     def render(self) -> Any:
-        """Return a picture or a text map of the world, depending on `render_mode`, or None."""
+        """Return a picture, uint8 (720, 1280, 3), or None without a render mode."""
         self._check_begun("render()")
         return None if self.render_mode is None else self._ants.draw(0)
 

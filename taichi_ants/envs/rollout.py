@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.error import InvalidAction
 
-from taichi_ants.errors import as_array, checked_whole, shown
+from taichi_ants.errors import checked_whole, shown
 from taichi_ants.grid.randomness import GAMMA, mix
 from taichi_ants.learners.policies import checked_table, frozen_policy
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
-
-if TYPE_CHECKING:
-    from taichi_ants.envs.formats import Shown
 
 _ALL_ACTIONS = (1 << N_ACTIONS) - 1  # a mask, in which bit a is action a
 
@@ -42,25 +39,6 @@ class Rollout(NamedTuple):
     truncated: np.ndarray
     events: np.ndarray
     final_observations: np.ndarray
-
-    @classmethod
-    def empty(cls, steps: int, n: int, formats: Shown) -> Rollout:
-        """Return a rollout whose arrays have no values yet."""
-        shape, (_, *seen) = (steps, n), formats.table.shape
-        return cls(
-            observations=np.empty((steps + 1, n, *seen), formats.table.dtype),
-            actions=np.empty(shape, np.int64),
-            rewards=np.empty(shape),
-            terminated=np.empty(shape, bool),
-            truncated=np.empty(shape, bool),
-            events=np.empty(shape, np.uint8),
-            final_observations=np.empty((0, *seen), formats.table.dtype),
-        )
-
-    def check_like(self, other: Rollout) -> None:
-        """Raise AntsError unless the arrays of this `out` have the shapes and types of another."""
-        for name, mine, wanted in zip(self._fields[:-1], self, other, strict=False):
-            as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
 
 
 class TablePolicy(NamedTuple):

@@ -152,17 +152,14 @@ def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World,
         )
     if len(entries) > most:
         raise AntsError(f"world lists {len(entries)} worlds; it must list at most {most}.")
-    checked = tuple(
-        checked_world(_world_of(entry), what="the environment", supports=supports)
-        for entry in entries
-    )
-    check_ranges(checked)
-    return checked
-
-
-def _world_of(world: Any) -> Any:
-    text = isinstance(world, str) and "\n" in world
-    return world if isinstance(world, World) else from_text(world) if text else build(world)
+    built = []
+    for entry in entries:
+        if not isinstance(entry, World):
+            is_map = isinstance(entry, str) and "\n" in entry
+            entry = from_text(entry) if is_map else build(entry)
+        built.append(checked_world(entry, what="the environment", supports=supports))
+    check_ranges(built)
+    return tuple(built)
 
 
 def task_of(task: Rules | None) -> Task:
@@ -343,10 +340,18 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         waiting, ants, n = self._waiting("rollout"), self._ants, self.num_envs
         length, actions, q_values = checked_plan(policy, steps, n, ants.task)
         epsilon, choices = checked_share("epsilon", epsilon), None
-        into = Rollout.empty(length, n, ants.shown)
+        shape, table = (length, n), ants.shown.table
+        into = Rollout(
+            np.empty((length + 1, n, *table.shape[1:]), table.dtype),
+            np.empty(shape, np.int64),
+            *(np.empty(shape), np.empty(shape, bool), np.empty(shape, bool)),
+            events=np.empty(shape, np.uint8),
+            final_observations=table[:0],
+        )
         if out is not None:
             expect("out", out, Rollout)
-            out.check_like(into)
+            for name, mine, wanted in zip(into._fields[:-1], out, into, strict=False):
+                as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
             into = out
         if actions is not None:
             into = into._replace(actions=actions)
@@ -372,7 +377,7 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         return infos | {f"_{name}": have.copy() for name in facts}
 
     def render(self) -> tuple[Any, ...] | None:
-        """Return the world of each environment, as a picture or a text map, or None.
+        """Return the world of each environment, as a picture, or None.
 
         Ants that share a world also share its picture.
         """

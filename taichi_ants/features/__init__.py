@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from taichi_ants.features.castes import CASTES
 from taichi_ants.features.feature import Array, Feature, KernelFunction, Task
@@ -13,6 +11,9 @@ from taichi_ants.features.labour import LABOUR
 from taichi_ants.features.life import AGE
 from taichi_ants.features.noise import MISREAD, SLIP
 from taichi_ants.features.points import POINTS
+
+if TYPE_CHECKING:
+    import numpy as np
 
 # In the order of their hooks, which is the order of random draws.
 FEATURES: tuple[Feature, ...] = (CASTES, LABOUR, SLIP, MISREAD, AGE)
@@ -34,6 +35,8 @@ def hooks_at(features: Collection[Feature]) -> dict[str, list[KernelFunction]]:
 
 def probabilities(task: Task) -> dict[str, np.uint64]:
     """Return the probabilities of features as kernels read them: bounds of a random 32-bit word."""
+    import numpy as np
+
     return {
         f"{name}_below": np.uint64(getattr(feature.of(task), name) * 4294967296.0)
         for feature in FEATURES

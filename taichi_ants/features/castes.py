@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
-
-import numpy as np
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from taichi_ants.errors import AntsError
 from taichi_ants.features.feature import ANT, CASTE, Array, Feature, State, Task
 from taichi_ants.features.labour import Threshold
 from taichi_ants.features.life import Ticks
 from taichi_ants.settings import Setting, Settings
+
+if TYPE_CHECKING:
+    import numpy as np
 
 TRAIL = "trail"
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
@@ -190,6 +191,8 @@ def chances_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[float]:
 
 def _columns(state: State) -> dict[str, np.ndarray]:
     """Return the caste of each ant that starts, int8 (W, ants)."""
+    import numpy as np
+
     nests = state.nests_at_start
     castes = np.zeros(nests.shape, np.int8)
     for w, nest in np.ndindex(len(nests), state.n_nests):
@@ -201,6 +204,8 @@ def _columns(state: State) -> dict[str, np.ndarray]:
 
 def _constants(state: State) -> dict[str, np.ndarray]:
     """Return the probabilities of the castes of newborn ants, and scratch counts of deliveries."""
+    import numpy as np
+
     nests, chances = state.nests_at_start, []
     for w, nest in np.ndindex(len(nests), state.n_nests):
         n = int(np.count_nonzero(nests[w] == nest))

@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from inspect import signature
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from taichi_ants.features.points import POINTS
 from taichi_ants.settings import Settings
+
+if TYPE_CHECKING:
+    import numpy as np
 
 ANT, NEST, CASTE = "ant", "nest", "caste"
 Function = Callable[..., Any]
@@ -67,6 +68,8 @@ class Mark(NamedTuple):
 
     def fades(self, values: np.ndarray, settings: Any) -> np.ndarray:
         """Return how faded ants are, uint8 (n,), from 0 to 255 for true, or for 0."""
+        import numpy as np
+
         most = getattr(settings, self.most) if self.most else None
         shares = values if most is None else 1.0 - np.clip(values / most, 0.0, 1.0)
         return np.rint(255 * shares).astype(np.uint8)

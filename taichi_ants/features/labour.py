@@ -25,8 +25,6 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
-import numpy as np
-
 from taichi_ants.errors import is_flag
 from taichi_ants.features.feature import (
     ANT,
@@ -170,8 +168,8 @@ def _faults(task: Task) -> Iterator[str]:
 
 
 def _foraging(snapshot: Any) -> float:
-    foragers = int(np.count_nonzero(~snapshot.ant_idle))
-    return foragers / len(snapshot.ant_idle) if len(snapshot.ant_idle) else np.nan
+    n = len(snapshot.ant_idle)
+    return int((~snapshot.ant_idle).sum()) / n if n else float("nan")
 
 
 LABOUR = Feature(

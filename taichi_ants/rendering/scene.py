@@ -15,7 +15,7 @@ from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks
 from taichi_ants.task import Observation, Task, observations
-from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, FOOD, N_ACTIONS, QUEEN
+from taichi_ants.task.constants import ACTION_NAMES, FOOD, N_ACTIONS, QUEEN
 from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.states import TASK_NAMES
 
@@ -100,10 +100,9 @@ class Scene:
         title: A line above the panel.
         overlay: Draw the panel and the marks; False draws the world alone.
         view: Leave space for cells in view outside the border of the world.
-        strongest: The trail level, 1 or more, at and above which trails have the darkest colour.
         task: The task of the ants, from which the legend takes cues and the names of kinds of
-            food, and fields their strongest levels; it replaces `strongest`. If deposits diffuse,
-            add up or follow your rule, each picture fits the scale to its levels.
+            food, and fields their strongest levels. If deposits diffuse, add up or follow your
+            rule, each picture fits the scale to its levels.
 
     Raises:
         AntsError: An argument is of the wrong kind, or the size is not allowed.
@@ -117,14 +116,13 @@ class Scene:
         title: str = "",
         overlay: bool = True,
         view: bool = False,
-        strongest: int = DEPOSIT_LEVEL,
         task: Task | None = None,
     ) -> None:
         expect("grid", grid, AxialGrid)
         expect("task", task, Task, type(None))
         self._task, self._title, self._overlay = task, title, overlay
         fields = {} if task is None else {TRAIL: task.pheromone, **task.fields}
-        scales: dict[str, int | None] = {TRAIL: strongest}
+        scales: dict[str, int | None] = {}
         for name, rule in fields.items():
             told = rule.deposit in ("none", "set", "fading") and not rule.diffusion
             scales[name] = rule.darkest if told else None  # None: the rules tell no usual levels
@@ -250,15 +248,11 @@ def _draw_status(
         room = width - text.width(label + "  ", size)
         text.write(frame, value, left + width, y, size, align="right", room=room)
         y += round(1.45 * size)
-    if status.q_values is not None:
-        y += round(0.3 * size)
-        text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
-        _draw_bars(frame, status, y + round(0.5 * size), left, width, size)
-
-
-def _draw_bars(
-    frame: np.ndarray, status: Status, top: int, left: int, width: int, size: int
-) -> None:
+    if status.q_values is None:
+        return
+    y += round(0.3 * size)
+    text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
+    top = y + round(0.5 * size)
     start = left + max(text.width(name, size) for name in ACTION_NAMES) + 0.6 * size
     end = left + width - text.width("-00.00", size) - 0.3 * size
     low, high = status.q_range

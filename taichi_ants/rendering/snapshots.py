@@ -28,16 +28,13 @@ CaptionedSnapshot = tuple[Snapshot, Status]
 
 
 def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
-    """Return a world with n ants at the start of an episode; raises as `World.start` does."""
-    return _start_of(world, *world.start(seed, n))
-
-
-def _start_of(world: World, cells: np.ndarray, headings: np.ndarray) -> Snapshot:
-    """Return a world with ants without food."""
-    nothing, kinds = np.zeros(len(cells), dtype=bool), np.zeros(world.grid.size, np.uint8)
+    """Return a world with n ants, or none, at the start; raises as `World.start` does."""
+    cells, headings = world.start(seed, n) if n else np.zeros((2, 0), np.int32)
+    kinds = np.zeros(world.grid.size, np.uint8)
     kinds[world.grid.index(world.foods[: len(world.food_kinds)])] = world.food_kinds
     return Snapshot(
-        *(world.grid, world.ground(), world.trail_levels(), cells, headings, nothing),
+        *(world.grid, world.ground(), world.trail_levels(), cells, headings),
+        ant_carries=np.zeros(len(cells), dtype=bool),
         food_kinds=kinds,
         queens=world.grid.index(world.queens).astype(np.int32),
         world=world,
@@ -46,8 +43,7 @@ def _start_of(world: World, cells: np.ndarray, headings: np.ndarray) -> Snapshot
 
 def picture(world: World, size: tuple[int, int] = DEFAULT_SIZE) -> np.ndarray:
     """Return a picture of a world and its listed ants, uint8 (height, width, 3)."""
-    cells, headings = world.grid.index(world.ants[:, :3]), world.ants[:, 3].astype(np.int32)
-    return Scene(world.grid, size).draw(_start_of(world, cells, headings))
+    return Scene(world.grid, size).draw(at_start(world, n=len(world.ants)))
 
 
 def frames(
@@ -78,12 +74,6 @@ class Episode:
         return cls(rollout(world, q_values, **rules), name)
 
     @property
-    def arguments(self) -> RolloutArguments:
-        """The world, task, policy and seed of the episode."""
-        assert self.trace.arguments is not None  # `rollout` sets it
-        return self.trace.arguments
-
-    @property
     def delivered(self) -> bool:
         """Whether the episode ended with a delivery."""
         return bool(self.trace.delivered[-1])
@@ -94,8 +84,9 @@ class Episode:
 
     def snapshots(self) -> Iterator[CaptionedSnapshot]:
         """Yield the world before each step, with the action that follows, and at the end."""
-        colony, trace = colony_of_rollout(self.arguments), self.trace
-        table, sees = colony.q_values[0], self.arguments.task.sees
+        trace, arguments = self.trace, self.trace.arguments
+        assert arguments is not None  # `rollout` sets it
+        colony, sees = colony_of_rollout(arguments), arguments.task.sees
         states = [*trace.states.tolist(), int(trace.next_states[-1])]
         actions = [*trace.actions.tolist(), None]
         returns = [0, *np.cumsum(trace.rewards).tolist()]
@@ -106,7 +97,7 @@ class Episode:
             last = [] if action is None else [("action", ACTION_NAMES[action])]
             if action is None and self.delivered:
                 last = [("outcome", "delivered")]
-            q_values = table[state]
+            q_values = colony.q_values[0, state]
             status = _status_of(sees, state, q_values, action, trace.q_values, lines, last)
             yield colony.snapshot(), status
 

@@ -54,11 +54,6 @@ def is_picture(path: files.PathLike) -> bool:
     return Path(path).suffix.lower() == ".png"
 
 
-def check_picture(path: files.PathLike) -> Path:
-    """Return the path of a picture after checking it; raises as `save_picture` does."""
-    return check_file(path, "one picture", ".png")
-
-
 def check_file(path: files.PathLike, holds: str, *endings: str) -> Path:
     """Return a path after checking its extension and that it is writable; AntsError if not."""
     target = files.check_writable_file(path)
@@ -93,7 +88,11 @@ def save_animation(
         *_, last = checked
         write(target, png(last, optimize=True))
     else:
-        write(target, _gif(checked, fps))
+        # The GIF repeats forever; Pillow merges equal frames and stores only changes.
+        buffer, images = io.BytesIO(), _with_palette(checked, fps)
+        changes = {"optimize": True, "transparency": _UNCHANGED, "disposal": 1}
+        next(images).save(buffer, "GIF", save_all=True, append_images=images, loop=0, **changes)
+        write(target, buffer.getvalue())
 
 
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
@@ -102,7 +101,7 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     Raises:
         AntsError: The file does not end in .png, or is not writable.
     """
-    save_animation(check_picture(path), [frame])
+    save_animation(check_file(path, "one picture", ".png"), [frame])
 
 
 def write(target: Path, content: bytes) -> None:
@@ -138,16 +137,11 @@ def png(frame: np.ndarray, optimize: bool = False) -> bytes:
     return buffer.getvalue()
 
 
-def _gif(frames: Iterable[np.ndarray], fps: float) -> bytes:
-    """Return a GIF that repeats forever; Pillow merges equal frames and stores only changes."""
-    buffer, images = io.BytesIO(), _with_palette(frames, fps)
-    changes = {"optimize": True, "transparency": _UNCHANGED, "disposal": 1}
-    next(images).save(buffer, "GIF", save_all=True, append_images=images, loop=0, **changes)
-    return buffer.getvalue()
-
-
 def _with_palette(frames: Iterable[np.ndarray], fps: float) -> Iterator[Image]:
-    """Yield frames in the nearest colours of the first frame's palette, with their durations."""
+    """Yield frames in the nearest colours of a palette, with their durations.
+
+    The palette has the colours of scenes and of the first frame.
+    """
     from PIL import Image
 
     nearest = np.full(1 << 24, -1, np.int16)  # the index of each colour in the palette, once known
@@ -155,7 +149,10 @@ def _with_palette(frames: Iterable[np.ndarray], fps: float) -> Iterator[Image]:
     told, still = 0, 0  # milliseconds so far, and of the present picture
     for number, frame in enumerate(frames, start=1):
         if number == 1:
-            palette, before = _palette(frame), ~frame
+            kept, sample = map(colours.channels, (_KEPT, np.unique(colours.packed(frame))))
+            free = Image.fromarray(sample[None]).quantize(_UNCHANGED - len(kept)).getpalette()
+            more = np.array(free, dtype=np.uint8).reshape(-1, 3)
+            palette, before = np.concatenate([kept, more])[:_UNCHANGED], ~frame
             indices = np.zeros(frame.shape[:2], np.uint8)
         # Most pixels stay, so only rows that change are converted.
         rows = np.flatnonzero((frame != before).any(axis=(1, 2)))
@@ -174,12 +171,3 @@ def _with_palette(frames: Iterable[np.ndarray], fps: float) -> Iterator[Image]:
         image.info["duration"] = until - told if still <= _LONGEST else 0
         yield image
         before, indices, told = frame.copy(), shown, until
-
-
-def _palette(first: np.ndarray) -> np.ndarray:
-    """Return a palette for all frames, uint8 (n, 3): the colours of scenes and the first frame."""
-    from PIL import Image
-
-    kept, sample = map(colours.channels, (_KEPT, np.unique(colours.packed(first))))
-    free = Image.fromarray(sample[None]).quantize(_UNCHANGED - len(kept)).getpalette()
-    return np.concatenate([kept, np.array(free, dtype=np.uint8).reshape(-1, 3)])[:_UNCHANGED]

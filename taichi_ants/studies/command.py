@@ -140,8 +140,8 @@ def opened(path: Path) -> Iterator[Planned]:
         yield replace(again, facts={name: asked[name] for name in again.facts})
 
 
-def run_study(settings: Namespace, planned: Planned) -> bool:
-    """Compute the results of a study unless its folder has them, and print the report.
+def run_study(settings: Namespace, planned: Planned, report: bool = True) -> bool:
+    """Compute the results of a study unless its folder has them, and print the `report`.
 
     Args:
         settings: The options of `command_line.add_common`, `add_machines` and `add_results`.
@@ -187,7 +187,8 @@ def run_study(settings: Namespace, planned: Planned) -> bool:
             is_finished = True
         except DamagedError as error:
             notice(str(error))
-    print(files.read_text(out / REPORT))
+    if report:
+        print(files.read_text(out / REPORT))
     if is_shown:
         print(f"{out}/ already has these results; use --force to write their tables again.")
     else:

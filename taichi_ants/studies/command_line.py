@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 EXIT_BAD_INPUT = 2
 # Help for options that several commands have.
 PLUGIN = "Python file that registers learners, observations, worlds, measures or rules"
-THREADS = "number of CPU threads (default: all)"
 # Names of worlds, because an import of their registry would import NumPy.
 WORLDS = (
     "paper, open, far_piles, double_bridge, or the path of a map file; --world.SETTING changes a "
@@ -108,10 +107,16 @@ def add_common(parser: argparse.ArgumentParser) -> None:
     """Add the options of all commands that compute something."""
     add = parser.add_argument
     add("--plugin", metavar="FILE", help=PLUGIN)
-    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
+    add_threads(parser)
     arch = "processor of the simulation: cpu, or cuda for an NVIDIA GPU (runs of lone ants only, "
     arch += "with other last bits)"
     add("--arch", choices=("cpu", "cuda"), default="cpu", help=arch)
+
+
+def add_threads(parser: argparse.ArgumentParser) -> None:
+    """Add the option --threads."""
+    words = "number of CPU threads (default: all)"
+    parser.add_argument("--threads", type=whole_number(1, 1024), metavar="N", help=words)
 
 
 def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) -> None:

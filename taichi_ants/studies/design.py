@@ -19,50 +19,36 @@ from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_wh
 
 GRID, LATIN_HYPERCUBE, SOBOL, RANDOM = DESIGNS = ("grid", "latin_hypercube", "sobol", "random")
 KEYS = ("design", "samples", "design_seed", "sensitivity")
-_OF_RANGE = ("from", "to", "scale", "whole", "steps")
-_MOST = 100_000  # samples, and values of a range in a grid
 
 
 class Range(NamedTuple):
-    """A range of numbers with both ends.
+    """A range of numbers with both ends; `whole` has whole numbers only, as int.
 
-    Attributes:
-        log: Whether equal factors, not equal differences, are equally frequent.
-        whole: Whether it has whole numbers only, as int.
-        steps: The number of values in a grid; None for other designs.
+    With `log`, equal factors are equally frequent, otherwise equal differences.
     """
 
     low: float
     high: float
     log: bool = False
     whole: bool = False
-    steps: int | None = None
 
     @classmethod
     def of(cls, name: str, table: Mapping[str, Any], whole: bool) -> Range:
-        """Return the range in a table; `whole` applies if the table does not have the key.
-
-        Raises:
-            AntsError: A key or a value is not allowed; the message begins with `name`.
-        """
+        """Return the range in a table; AntsError, which begins with `name`, if it is not one."""
         for key in table:
-            check_one_of(f"a key of the range {name}", key, _OF_RANGE)
-        whole = checked_flag(f"{name}.whole", table.get("whole", whole))
+            check_one_of(f"a key of the range {name}", key, ("from", "to", "scale"))
         check_one_of(f"{name}.scale", table.get("scale", "linear"), ("linear", "log"))
-        log, steps = table.get("scale") == "log", table.get("steps")
-        if steps is not None:
-            checked_whole(f"{name}.steps", steps, 2, _MOST)
-        kinds = (int,) if whole else (int, float)
+        log, kinds = table.get("scale") == "log", (int,) if whole else (int, float)
         ends: Any = table.get("from"), table.get("to")
         low, high = ends
-        are_numbers = all(type(end) in kinds and -(2**53) <= end <= 2**53 for end in ends)
+        are_numbers = all(type(end) in kinds and abs(end) <= 2**53 for end in ends)
         if not (are_numbers and low < high and (low > 0 or not log)):
             kind, above = "whole number" if whole else "number", ", above 0 for the scale log" * log
             raise AntsError(
                 f"{name} is from {shown(low)} to {shown(high)}; both must be a {kind}, and the "
                 f"first the smaller one{above}."
             )
-        return cls(low if whole else float(low), high if whole else float(high), log, whole, steps)
+        return cls(low if whole else float(low), high if whole else float(high), log, whole)
 
     def at(self, share: float) -> float | int:
         """Return the value at a share of the range, 0 to 1; whole numbers have equal parts."""
@@ -75,13 +61,6 @@ class Range(NamedTuple):
         value = math.floor(value + 0.5) if self.whole else value
         return min(max(value, self.low), self.high)
 
-    def values(self) -> list[float | int]:
-        """Return `steps` values from one end to the other, without repetitions."""
-        ends = Range(self.low, self.high, self.log)  # a grid of whole numbers includes both ends
-        steps = self.steps or 0
-        values = [ends.at(step / (steps - 1)) for step in range(steps)]
-        return list(dict.fromkeys(map(round, values) if self.whole else values))
-
 
 class Choices(NamedTuple):
     """A list of values that are equally frequent."""
@@ -91,10 +70,6 @@ class Choices(NamedTuple):
     def at(self, share: float) -> Any:
         """Return the value at a share of the list, 0 to 1."""
         return self.choices[min(int(share * len(self.choices)), len(self.choices) - 1)]
-
-    def values(self) -> list[Any]:
-        """Return all values."""
-        return list(self.choices)
 
 
 Axis = Range | Choices
@@ -136,13 +111,10 @@ class Design:
         kind = file.get("design", GRID)
         check_one_of("design", kind, DESIGNS)
         if kind == GRID:
-            for key in KEYS[1:]:
-                if key in file:
-                    raise AntsError(
-                        f"{key} is for the designs {', '.join(DESIGNS[1:])}; set design."
-                    )
+            for key in file.keys() & KEYS[1:]:
+                raise AntsError(f"{key} is for the designs {', '.join(DESIGNS[1:])}; set design.")
             return cls()
-        samples = checked_whole("samples", file.get("samples"), 1, _MOST)
+        samples = checked_whole("samples", file.get("samples"), 1, 100_000)
         seed = checked_whole("design_seed", file.get("design_seed", 0), 0, 2**63 - 1)
         sensitivity = checked_flag("sensitivity", file.get("sensitivity", False))
         if sensitivity:
@@ -166,21 +138,15 @@ class Design:
         return {"design": {"design": self.kind, "design_seed": self.seed, **fixed, **more}}
 
     def rows(self, axes: Mapping[str, Axis]) -> list[dict[str, Any]]:
-        """Return the points: a value of each axis by name.
-
-        Raises:
-            AntsError: A range lacks `steps`, or has them in vain, or nothing varies.
-        """
-        is_grid, drawn = self.kind == GRID, varying(axes)
-        for name, axis in axes.items():
-            if isinstance(axis, Range) and is_grid != bool(axis.steps):
-                raise AntsError(
-                    f"{name}.steps is {axis.steps}, but the design is {self.kind!r}; a range in a "
-                    "grid needs steps, such as steps = 5, and other designs have none."
-                )
-        if is_grid:
-            values = itertools.product(*(axis.values() for axis in axes.values()))
-            return [dict(zip(axes, row, strict=True)) for row in values]
+        """Return the points: a value of each axis by name; AntsError if axes do not suit."""
+        drawn = varying(axes)
+        if self.kind == GRID:
+            lists = []
+            for name, axis in axes.items():
+                if isinstance(axis, Range):
+                    raise AntsError(f"{name} is a range, but a grid needs lists; set design.")
+                lists.append(axis.choices)
+            return [dict(zip(axes, row, strict=True)) for row in itertools.product(*lists)]
         if not drawn:
             raise AntsError(f"[vary] has single values only; the design {self.kind!r} needs more.")
         fixed = {name: axis.at(0.0) for name, axis in axes.items()}
@@ -199,8 +165,8 @@ class Design:
         if self.sensitivity:
             from SALib.sample import sobol
 
-            names = [str(number) for number in range(dimensions)]
-            problem = {"num_vars": dimensions, "names": names, "bounds": [[0, 1]] * dimensions}
+            problem = {"num_vars": dimensions, "bounds": [[0, 1]] * dimensions}
+            problem["names"] = [str(number) for number in range(dimensions)]
             return sobol.sample(problem, self.samples, calc_second_order=False, seed=self.seed)
         if self.kind == LATIN_HYPERCUBE:
             return qmc.LatinHypercube(dimensions, seed=self.seed).random(self.samples)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,66 +16,40 @@ from taichi_ants.studies.command_line import Parser, run_command, whole_number
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Row = dict[str, Any]
+Rows = list[dict[str, Any]]
+# The rows of the CSV file, the numbers of the figure; the rows of the table, one for each seed and
+# condition: the column of the condition, then measures; the title of the figure; what draws it.
+Results = tuple[Rows, Rows, str, Callable[["Axes"], object]]
 
 
-class Results(NamedTuple):
-    """The results of a script.
-
-    Attributes:
-        numbers: The rows of the CSV file, the numbers of the figure.
-        summary: The rows of the table, one for each seed and condition: the column of the
-            condition, then measures.
-        title: The title of the figure.
-        draw: A function that draws the figure into axes.
-    """
-
-    numbers: list[Row]
-    summary: list[Row]
-    title: str
-    draw: Callable[[Axes], object]
-
-
-def run(
-    script: str,
-    doc: str | None,
-    measure: Callable[[list[int]], Results],
-    arguments: Sequence[str] | None = None,
-) -> None:
-    """Run a script with the options --seeds and --out.
+def run(script: str, doc: str | None, measure: Callable[[list[int]], Results]) -> None:
+    """Run a script, the path of a file, with the options --seeds and --out.
 
     It writes NAME.csv and NAME.png, where NAME is that of the script, and prints a table of means
-    over seeds with 95 % intervals.
-
-    Args:
-        script: The path of the script, `__file__`.
-        doc: Its docstring, which the option --help prints.
-        measure: A function of the seeds that returns the results.
-        arguments: The command line; None for that of the process.
+    over seeds with 95 % intervals. `measure` is a function of the seeds.
     """
-    name = Path(script).stem
-    parser = Parser(doc)
+    name, parser = Path(script).stem, Parser(doc)
     parser.add_argument("--seeds", type=whole_number(1), default=20, help="number of seeds")
     parser.add_argument("--out", type=Path, default=Path("results") / name, help="output folder")
-    options = parser.parse_args(arguments)
+    options = parser.parse_args()
 
     def main() -> None:
         folder = files.check_writable_folder(options.out)
-        results = measure(list(range(options.seeds)))
-        files.write_csv(folder / f"{name}.csv", results.numbers, list(results.numbers[0]))
-        print(table(results.summary))
+        numbers, summary, title, draw = measure(list(range(options.seeds)))
+        files.write_csv(folder / f"{name}.csv", numbers, list(numbers[0]))
+        print(table(summary))
         with style.styled():
             figure = style.new_figure(3.5)
             axes = figure.subplots()
-            results.draw(axes)
-            style.frame(figure, results.title, "", style.legend_entries([axes]))
+            draw(axes)
+            style.frame(figure, title, "", style.legend_entries([axes]))
         style.save(figure, folder / f"{name}.png")
         print(f"\nNumbers: {folder / name}.csv. Figure: {folder / name}.png.")
 
     run_command(main)
 
 
-def table(rows: Sequence[Row]) -> str:
+def table(rows: Rows) -> str:
     """Return means with 95 % bootstrap intervals, a line for each value of the first column."""
     by, *names = rows[0]
     lines = [[by, *names]]

@@ -241,7 +241,7 @@ def tables(sweep: Sweep, results: Results) -> str:
         files.write_csv(folder / SENSITIVITY, of_all, fields)
     if results.figures:
         files.check_writable_folder(folder / FIGURES)
-        _draw(sweep, first, values[first], indices.get(first, []), folder / FIGURES)
+        _draw(sweep, first, values[first], folder / FIGURES)
     return report
 
 
@@ -275,13 +275,7 @@ def _report_on_highest(sweep: Sweep, values: dict[str, np.ndarray]) -> str:
     return f"{len(means)} points of the design {sweep.design.kind!r}; {most}:\n\n{table}"
 
 
-def _draw(
-    sweep: Sweep,
-    measure: str,
-    values: np.ndarray,
-    indices: Sequence[sensitivity.Index],
-    folder: Path,
-) -> None:
+def _draw(sweep: Sweep, measure: str, values: np.ndarray, folder: Path) -> None:
     """Draw a measure, float64 (points, seeds), in a figure for each [vary] table."""
     label = finished.of_runs(sweep.kind, measure).label
     for number, (grid, axes) in enumerate(zip(sweep.grids, sweep.axes, strict=True), start=1):
@@ -293,6 +287,3 @@ def _draw(
             logs = {n for n, axis in axes.items() if isinstance(axis, Range) and axis.log}
             names = list(design.varying(axes))
             sweeps.draw_design(path, settings, names, logs, values[grid], label)
-    if indices:
-        path = folder / f"sensitivity_{measure}.png"
-        sensitivity.draw(path, indices, label, values.shape[1])

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
 from itertools import permutations
 from typing import NamedTuple
 
@@ -215,14 +214,9 @@ def to_text(world: World) -> str:
         letters = ANTS_ON_TRAIL if tuple(cell) in on_trail else ANTS
         marks.append((np.array([cell]), letters[heading]))
     lines = (f"trail = {level}\n" for level in levels)
-    return "".join(lines) + drawing(world.ranges, marks)
-
-
-def drawing(ranges: tuple[int, int, int], marks: Iterable[tuple[np.ndarray, str]]) -> str:
-    """Return a drawing with characters on cells (n, 3) in normal form; later ones cover earlier."""
-    size_x, size_y, size_z = ranges
+    size_x, size_y, size_z = world.ranges
     page = np.full((2 * size_x + size_y + size_z - 3, 2 * (size_y + size_z) - 3), " ")
-    for cells, mark in marks:
+    for cells, mark in marks:  # later ones cover earlier ones
         x, y, z = cells.T
         page[y + z - 2 * (x - size_x + 1), 2 * (y - z + size_z - 1)] = mark
-    return "".join("".join(row).rstrip() + "\n" for row in page)
+    return "".join([*lines, *("".join(row).rstrip() + "\n" for row in page)])

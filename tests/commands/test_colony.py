@@ -34,7 +34,6 @@ NO_FILE = "is not a regular file"
         (["--quick"], "unrecognized arguments: --quick"),
         (["--resume", "x", "--task.life.births"], "births cannot change a resumed colony"),
         (["--sharing", "frozen", "--training.discount", 0.9], "discount has no effect with"),
-        (["--figure", "a.gif"], "'a.gif' cannot hold one picture"),
         (["--resume", "x"], "cannot read 'x'"),
         (["--world", "nowhere"], "there is no world 'nowhere'"),
         (["--task.life.births", "--capacity", 5], "capacity is 5; it must lie between 80 and"),

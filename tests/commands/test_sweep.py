@@ -447,7 +447,7 @@ def test_a_design_has_rows_of_drawn_values_indices_and_figures(sweep):
     names = {name for name in contents(folder) if not name.startswith(("blocks/", "sessions/"))}
     assert names == {
         *("runs.csv", "summary.csv", "sensitivity.csv", "report.txt", "manifest.json"),
-        *("figures/blocked.png", "figures/sensitivity_blocked.png", "inputs/my.toml", "study.json"),
+        *("figures/blocked.png", "inputs/my.toml", "study.json"),
     }
     rows = numbers_in(folder / "runs.csv")
     assert len(rows) == 4 * (3 + 2) * 2

@@ -70,8 +70,8 @@ def test_home_trail_averages_the_last_five_episodes(script):
     found = script("models/home_trail", Colony=Given, EPISODES=6)
     Given.deliveries = np.array([[100, 7], [1, 2], [2, 2], [3, 2], [4, 2], [5, 2]])
     results = found["measure"]([3, 9])
-    assert table(results.summary, "deliveries") == [(3.0,), (2.0,)] * 3
-    rows = table(results.numbers, "model", "seed", "episode", "deliveries")
+    assert table(results[1], "deliveries") == [(3.0,), (2.0,)] * 3
+    rows = table(results[0], "model", "seed", "episode", "deliveries")
     assert rows[:2] == [("compass", 3, 0, 100), ("compass", 3, 1, 1)]
     assert rows[6] == ("compass", 9, 0, 7)
     assert len(rows) == 3 * 2 * 6
@@ -86,7 +86,7 @@ def test_a_home_trail_that_nobody_follows_does_not_matter(script):
         "followed": found["HOME_TRAIL"],
     }
     found.update(MODELS=models, EPISODES=2, TICKS=200)
-    delivered = np.array([row["deliveries"] for row in found["measure"]([0, 1, 2]).numbers])
+    delivered = np.array([row["deliveries"] for row in found["measure"]([0, 1, 2])[0]])
     compass, laid, followed = delivered.reshape(3, -1)
     assert compass.sum() > 0
     assert np.array_equal(laid, compass)
@@ -105,11 +105,11 @@ def test_shares_of_two_nests_by_hand(script):
     found["deliveries_over_time"] = lambda seeds, near, far: given
     results = found["measure"]([4, 7, 8])
     columns = ("share of the first nest", "loads of both")
-    assert table(results.summary, *columns) == [(0.75, 4), (0.0, 5), (0.5, 8)]
-    rows = table(results.numbers, "seed", "tick", "first", "second")
+    assert table(results[1], *columns) == [(0.75, 4), (0.0, 5), (0.5, 8)]
+    rows = table(results[0], "seed", "tick", "first", "second")
     assert rows[:4] == [(4, 20, 1, 1), (4, 40, 3, 1), (7, 20, 0, 0), (7, 40, 0, 5)]
     axes = Figure().subplots()
-    results.draw(axes)
+    results[3](axes)
     (x,), (y,) = axes.lines[0].get_data()
     assert (x, y) == (40, 1.25 / 3)
 
@@ -141,8 +141,8 @@ def test_times_to_recover_by_hand(script):
     found["ants_over_time"] = lambda seeds, share: given[share]
     results = found["measure"]([0, 1, 2])
     expected = [(0.0, 0), (0.0, 0), (0.0, 0), (0.5, 0), (0.5, 200), (0.5, 150)]
-    assert table(results.summary, "share removed", "ticks to recover") == expected
-    assert results.numbers[-1] == {"removed": 0.5, "seed": 2, "tick": 250, "ants": 95}
+    assert table(results[1], "share removed", "ticks to recover") == expected
+    assert results[0][-1] == {"removed": 0.5, "seed": 2, "tick": 250, "ants": 95}
 
 
 def test_removing_no_ants_does_not_matter_and_removing_them_does(script):
@@ -241,12 +241,12 @@ def test_shares_of_foragers_by_hand(script):
     given = forages, np.array([[9.0, 1.0, 5.0]]), np.array([25])
     found["foraging_over_time"] = lambda seeds, demand: given
     results = found["measure"]([0])
-    (row,) = results.summary
+    (row,) = results[1]
     assert row == {
         **{"demand": 0.5, "foragers": 0.5, "low thresholds": 1.0, "high thresholds": 0.0},
         "food per demand": 0.25,
     }
-    rows = table(results.numbers, "tick", "foragers")
+    rows = table(results[0], "tick", "foragers")
     assert rows == [(50, 1 / 3), (100, 2 / 3), (150, 2 / 3), (200, 1 / 3)]
 
 

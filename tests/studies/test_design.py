@@ -78,14 +78,6 @@ def test_scales_spread_values_as_they_say():
     assert [Choices("abc").at(share) for share in (0, 0.33, 0.34, 0.99, 1)] == [*"aabcc"]
 
 
-def test_a_grid_of_ranges_has_steps():
-    axes = {"a": Range(1.0, 100.0, True, steps=3), "b": Range(1, 4, whole=True, steps=9)}
-    rows = Design().rows(axes)
-    assert [row["a"] for row in rows[::4]] == pytest.approx([1, 10, 100])
-    assert [row["b"] for row in rows[:4]] == [1, 2, 3, 4]
-    assert len(rows) == 12
-
-
 @pytest.mark.parametrize(
     ("kind", "sensitivity"), [("sobol", False), ("sobol", True), ("random", False)]
 )
@@ -156,15 +148,22 @@ WRONG = {
         ["half_life is from 0 to 9", "above 0 for the scale log"],
     ),
     "out of range": (SLIP, "{ from = 0, to = 1.5 }", ["noise.slip` is 1.5", "between 0 and 1"]),
-    "steps": (SLIP, "{ from = 0, to = 1, steps = 3 }", ["slip.steps is 3", "'sobol'"]),
-    "whole": (SLIP, "{ from = 0, to = 0.5, whole = true }", ["must be a whole number"]),
-    "below 1": (f"task.noise.slip = {SLIP}", "capacity = { from = 0, to = 3 }", ["capacity is 0"]),
+    "whole": (
+        f"task.noise.slip = {SLIP}",
+        "capacity = { from = 1.5, to = 3 }",
+        ["must be a whole number"],
+    ),
+    "below 1": (
+        f"task.noise.slip = {SLIP}",
+        "capacity = { from = 0, to = 3 }",
+        ["capacity is 0"],
+    ),
     "nothing varies": (
         f"half_life = {HALF}\ntask.noise.slip = {SLIP}",
         "half_life = 5",
         ["has single values only"],
     ),
-    "grid": ('design = "sobol"\nsamples = 8', "", ["half_life.steps is None", "steps = 5"]),
+    "grid": ('design = "sobol"\nsamples = 8', "", ["half_life is a range, but a grid needs lists"]),
     "sensitivity": ("sobol", "random", ["sensitivity = true with the design 'random'"]),
     "not a power": ("samples = 8", "samples = 9", ["samples = 9", "a power of 2"]),
     "against": ("[task]", "against.task.noise.slip = 0\n[task]", ["with a grid, it must be"]),

@@ -75,7 +75,8 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         acts = acts & (rests(ant_view(c, v, w, ant)) == 0)
     for acted in ti.static(v.at["acted"]):
         if acts:
-            stops = stops | acted(ant_view(c, v, w, ant))
+            if acted(ant_view(c, v, w, ant)):
+                stops = True
     paper_state, state = steps.observe(c, v, w, ant, tick + 1)
     next_action = -1
     if ti.static(v.has_own_reward):

@@ -494,9 +494,8 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     resting = 0
     for choose in ti.static(v.at["choose"]):
         rests, random_state = choose(ant_view(c, v, w, ant), random_state)
-        resting |= rests
-        # Without food, this action does nothing; `observe_and_learn` removes it.
-        action = ti.select(resting == 1, GIVE, action)
+        if rests == 1:  # without food, this action does nothing; `observe_and_learn` removes it
+            resting, action = 1, GIVE
     if action < 0:
         random_state = advance(random_state)
         state = state_index_of(c, v, ant)

@@ -177,6 +177,14 @@ def test_a_run_leaves_no_trace_of_its_protocol():
     assert followers([5]).run(2, 90) == followers([5]).run(2, 90, protocol=[])
 
 
+def test_events_of_successive_ticks_all_happen():
+    colony = Colony(
+        worlds.paper(), None, FOLLOWS, 0, 5, sharing="frozen", q_values=trail_follower()
+    )
+    events = [At(tick=1, remove_ants=1), At(tick=2, remove_ants=1)]
+    assert colony.run(1, 4, protocol=events).living.tolist() == [[3]]
+
+
 def test_interventions_by_hand_change_the_worlds_that_are_named():
     colony = followers(range(3))
     colony.begin_episode()
