@@ -272,11 +272,11 @@ class Controls {
     if (box.dataset.names !== names) {
       box.dataset.names = names;
       box.innerHTML = Object.entries(values).map(([name, one]) => {
-        const words = SLIDERS[name] ?? name.replaceAll("_", " "), about = `id="set-${name}" data-name="${name}"`;
+        const words = SLIDERS[name] ?? safe(name.replace(".", ": ").replaceAll("_", " ")), about = `id="set-${name}" data-name="${name}"`;
         const path = EXPLAINS[name] ?? one.path, setting = this.live.choices.settings.find((other) => other.path === path);
         const field = isSwitch(one) ? `<label class="rule"><input type="checkbox" ${about}> ${words}</label>`
           : `<label class="slider" for="set-${name}"><span>${words}</span><output for="set-${name}"></output><input type="range" ${about}></label>`;
-        return `<div class="field">${field}${helpOf(words, setting?.help ?? "living ants, also at the start of later episodes")}</div>`;
+        return `<div class="field">${field}${helpOf(words, one.help || (setting?.help ?? "living ants, also at the start of later episodes"))}</div>`;
       }).join("");
     }
     for (const [name, one] of Object.entries(values)) {

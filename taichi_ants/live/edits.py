@@ -7,6 +7,7 @@ episode and begins the next one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple, cast
@@ -16,6 +17,8 @@ import numpy as np
 from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.interventions import Intervention
+from taichi_ants.rules.rule import Parameters
+from taichi_ants.settings import declared
 
 Edit = dict[str, Any]
 
@@ -29,6 +32,7 @@ class Value(NamedTuple):
     step: float  # of the slider; if it is an int, all values are whole numbers
     path: str  # the name of the intervention, for "task" followed by that of the setting
     edits: Mapping[str, Edit] | None = None  # the edits for "0" and "1", for a switch
+    help: str = ""  # of a parameter of a rule that a user wrote
 
 
 def values(interventions: Interventions) -> dict[str, Value]:
@@ -38,6 +42,7 @@ def values(interventions: Interventions) -> dict[str, Value]:
     - epsilon, learning_rate: if changed, they no longer decay.
     - deposit: the `level` of `Pheromone`; slope, cap, half_life, diffusion: as in `Pheromone`.
     - evaporation: 1 if trails evaporate, else 0.
+    - RULE.PARAMETER: a parameter of a rule that you wrote.
     """
     colony, pheromone = interventions.colony, interventions.colony.pheromones[0]
     living, rules = int(np.count_nonzero(colony.living[0])), "task.pheromone"
@@ -70,6 +75,24 @@ def values(interventions: Interventions) -> dict[str, Value]:
         values["diffusion"] = Value(
             float(pheromone.diffusion), float(least), 1.0, 0.01, f"{rules}.diffusion"
         )
+    return values | _of_rules(colony.task.rules)
+
+
+def _of_rules(rules: Mapping[str, Parameters]) -> dict[str, Value]:
+    """Return the values of the parameters of rules, by RULE.PARAMETER."""
+    values = {}
+    for name, parameters in rules.items():
+        for setting in declared(type(parameters)):
+            value, rule = getattr(parameters, setting.name), setting.rule
+            # A bound that is not declared leaves room on the side of the default.
+            low = rule.above if rule.least is None else rule.least
+            least = min(value, 0, 2 * setting.default) if low is None else low
+            most = max(value, 2 * setting.default, least + 1) if rule.most is None else rule.most
+            step = 1 if setting.kind is int else 10.0 ** math.floor(math.log10(most - least) - 2)
+            least += step * (rule.least is None and rule.above is not None)
+            help = f"{rule.help} of the rule {name}, by default {setting.default:g}"
+            path = f"task.rules.{name}.{setting.name}"
+            values[f"{name}.{setting.name}"] = Value(value, least, most, step, path, help=help)
     return values
 
 

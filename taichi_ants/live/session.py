@@ -123,7 +123,7 @@ class Session:
         self.colony.observe([])  # has no effect, but compiles kernels for the first edit
         # The title must not contain the number of ants, because interventions change it.
         title = f"Ants in a world of {self.colony.grid.count} cells"
-        self._recorder = Recorder(self.colony, title=title, pheromone=setup.pheromone)
+        self._recorder = Recorder(self.colony, title=title)
         self._recorder.note()
         self._recorder.snapshot()
         self._named = set(self._recorder.names())

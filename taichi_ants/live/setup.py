@@ -19,7 +19,6 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import NAMED, checked_table
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, ROW
-from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds import text_map
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
@@ -37,7 +36,7 @@ _MOST = {
 }
 
 
-SUPPORTS = COLONY - OWN_RULES
+SUPPORTS = COLONY
 FORM_SUPPORTS = BASE - OWN_RULES - CASTES - FOODS - FIELDS  # of the form of the page
 
 
@@ -61,12 +60,10 @@ class Setup:
     epsilon: float = 0.01  # exploration rate of ants that follow action values
     world_seed: int = 0  # seed of a random world
     world_settings: Mapping[str, Any] = field(default_factory=dict)  # see `worlds.build`
-    pheromone: str = TRAIL  # that pages show and draw: the trail, or a field of the task
 
     def __post_init__(self) -> None:
         expect("world", self.world, str)
         checked_task(self.task, "the live page", SUPPORTS)
-        check_one_of("pheromone", self.pheromone, (TRAIL, *self.task.fields))
         for name, caste in self.task.castes.items():
             if caste.policy not in (None, *NAMED):  # pages must not name files
                 raise AntsError(

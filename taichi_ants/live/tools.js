@@ -105,7 +105,7 @@ class Tools {
 
   /* The pheromone that the page shows, as {field}; {} for the trail. */
   field() {
-    const field = this.live.viewer.history.header.pheromone;
+    const field = this.live.viewer.history.pheromone.name;
     return field === "trail" ? {} : { field };
   }
 
@@ -151,7 +151,7 @@ class Tools {
       const kind = this.name === "food" && history.header.foods.length > 1 ? { kind: byId("kind").value } : {};
       this.edit("place", { what: this.name, ...kind }, cells.filter((cell) => ground[cell] !== QUEEN));
     } else if (this.name === "trail") {
-      this.edit("trail", { level: history.header.strongest, ...this.field() }, cells.filter((cell) => ground[cell] !== OBSTACLE));
+      this.edit("trail", { level: history.pheromone.strongest, ...this.field() }, cells.filter((cell) => ground[cell] !== OBSTACLE));
     } else if (this.name === "ants") this.edit("add_ants", {}, free.filter((cell) => ground[cell] === EMPTY));
     else {
       this.edit("remove_ants", {}, cells.filter((cell) => taken.has(cell)));

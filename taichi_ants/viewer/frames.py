@@ -27,7 +27,7 @@ CLOCK = (
     "ants",
     "delivered",
     "ticks",
-    "trail_clock",
+    "trail_clock",  # then those of the fields in order
 )
 
 # Elements of a point of the curves, in order. `ticks` and `delivered` count all episodes,
@@ -66,20 +66,24 @@ SECTIONS = {
     # Points of curves since the previous frame, see `POINT`.
     "progress": "f8",
 }
-_HEAD = 8 * -(-(1 + len(SECTIONS)) // 2)  # bytes
 
 
-def types_of(size: int, n_states: int, dense: bool) -> dict[str, str]:
+def types_of(size: int, n_states: int, dense: bool, *fields: bool) -> dict[str, str]:
     """Return the type of each section of frames.
 
     `size` is the number of cells. If `dense`, trails are stored as levels, not as expiry clocks.
+    Each field adds sections like those of the trail, "trail1_at" and "trail1" for the first one;
+    `fields` says which of them are dense.
     """
     of_world = {
         "cell": "u2" if size < 2**16 else "u4",
         "state": "u2" if n_states < 2**16 else "u4",
         "level": "f4" if dense else "i4",
     }
-    return {name: of_world.get(kind, kind) for name, kind in SECTIONS.items()}
+    types = {name: of_world.get(kind, kind) for name, kind in SECTIONS.items()}
+    for number, levels in enumerate(fields, 1):
+        types |= {f"trail{number}_at": of_world["cell"], f"trail{number}": "f4" if levels else "i4"}
+    return types
 
 
 def pack(types: Mapping[str, str], sections: Mapping[str, Any]) -> bytes:
@@ -89,9 +93,9 @@ def pack(types: Mapping[str, str], sections: Mapping[str, Any]) -> bytes:
         array = np.ascontiguousarray(sections.get(name, ()), dtype=f"<{kind}")
         head.append(array.size)
         parts.append(array.tobytes() + bytes(-array.nbytes % 8))
-    body = b"".join(parts)
-    numbers = np.array([_HEAD + len(body), *head], dtype="<u4").tobytes()
-    return numbers.ljust(_HEAD, b"\0") + body
+    body, begin = b"".join(parts), 8 * -(-(1 + len(types)) // 2)
+    numbers = np.array([begin + len(body), *head], dtype="<u4").tobytes()
+    return numbers.ljust(begin, b"\0") + body
 
 
 @dataclass(frozen=True, eq=False)

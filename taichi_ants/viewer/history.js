@@ -98,7 +98,9 @@ class History {
     this.names = Object.keys(header.types);
     this.kinds = this.names.map((name) => ARRAYS[header.types[name]]);
     this.headBytes = 8 * Math.ceil((1 + this.names.length) / 2);
-    this.dense = header.types.trail === "f4";
+    this.trails = header.pheromones.map((_, n) => `trail${n || ""}`); // their sections
+    // The pheromone that the page shows, also after another session began if that has it.
+    this.shown = Math.max(header.pheromones.findIndex(({ name }) => name === History.chosen), 0);
     this.frames = [];
     this.first = 0; // the earliest stored moment
     this.bytes = 0;
@@ -106,24 +108,25 @@ class History {
     this.within = []; // points for curves, within the first episode: objects of `POINT`
     this.ends = []; // points at the ends of episodes
     this.values = new Map(); // entry of a table -> [moments, values] of its changes
-    // `stored` is the trail in the form of the kernels, `trail` its levels.
+    // `stored` are the pheromones in the form of the kernels, `trail` the levels of the shown one.
     this.world = {
       moment: -1, ground: new Uint8Array(this.grid.size), kinds: new Uint8Array(this.grid.size),
-      stored: this.emptyTrail(), trail: this.emptyTrail(),
+      stored: this.trails.map((name) => new ARRAYS[header.types[name]](this.grid.size)), trail: new Float64Array(this.grid.size),
     };
     this.kept = []; // copies of the world at some moments, for fast seeking
     this.lastKept = -Infinity;
     // At most 64 MiB of copies, so large worlds have fewer.
     this.keepEvery = 32;
-    this.mostKept = Math.max(8, Math.floor(2 ** 26 / (5 * this.grid.size)));
+    this.mostKept = Math.max(8, Math.floor(2 ** 26 / ((1 + 4 * this.trails.length) * this.grid.size)));
   }
 
   get length() {
     return this.frames.length;
   }
 
-  emptyTrail() {
-    return this.dense ? new Float32Array(this.grid.size) : new Int32Array(this.grid.size);
+  /* Facts about the pheromone that the page shows: {name, strongest, seen_by}. */
+  get pheromone() {
+    return this.header.pheromones[this.shown];
   }
 
   /* Zeros for the groups or marks of ants, in memory that frames share. */
@@ -231,7 +234,7 @@ class History {
     const entries = [...this.values.keys()].filter((entry) => this.values.get(entry)[0][0] <= moment);
     const sections = {
       ...frame, acts: [], choices: [], rewards: [], td_errors: [], ground_at: ground.keys(), ground, kinds_at: kinds.keys(), kinds,
-      trail_at: stored.keys(), trail: stored,
+      ...Object.fromEntries(this.trails.flatMap((name, n) => [[`${name}_at`, stored[n].keys()], [name, stored[n]]])),
       table_at: entries, table: entries.map((entry) => this.entry(moment, entry)),
       progress: points.flatMap((point) => POINT.map((name) => point[name])),
     };
@@ -264,7 +267,7 @@ class History {
   /* The world at a moment: {ground, trail}, where trail is levels. Valid until the next call. */
   worldAt(moment) {
     const world = this.world;
-    if (moment === world.moment) return world;
+    if (moment === world.moment && world.shown === this.shown) return world;
     if (moment < world.moment || moment > world.moment + this.keepEvery) {
       let from = null;
       for (const copy of this.kept) if (copy.moment <= moment) from = copy;
@@ -272,17 +275,18 @@ class History {
         world.moment = from.moment;
         world.ground.set(from.ground);
         world.kinds.set(from.kinds);
-        world.stored.set(from.stored);
+        world.stored.forEach((one, n) => one.set(from.stored[n]));
       } else if (moment < world.moment) {
         world.moment = -1;
         world.ground.fill(0);
         world.kinds.fill(0);
-        world.stored.fill(0);
+        for (const one of world.stored) one.fill(0);
       }
     }
     while (world.moment < moment) this.step();
-    const { trailClock } = this.frames[moment], { stored, trail } = world;
-    for (let cell = 0; cell < trail.length; cell++) trail[cell] = Math.max(stored[cell] - trailClock, 0);
+    const { trail } = world, stored = world.stored[this.shown], clock = this.frames[moment].clock[CLOCK.length - 1 + this.shown];
+    for (let cell = 0; cell < trail.length; cell++) trail[cell] = Math.max(stored[cell] - clock, 0);
+    world.shown = this.shown;
     return world;
   }
 
@@ -291,16 +295,16 @@ class History {
     if (frame.whole) {
       world.ground.fill(0);
       world.kinds.fill(0);
-      world.stored.fill(0);
+      for (const one of world.stored) one.fill(0);
     }
     frame.ground_at.forEach((cell, i) => (world.ground[cell] = frame.ground[i]));
     frame.kinds_at.forEach((cell, i) => (world.kinds[cell] = frame.kinds[i]));
-    frame.trail_at.forEach((cell, i) => (world.stored[cell] = frame.trail[i]));
+    this.trails.forEach((name, n) => frame[`${name}_at`].forEach((cell, i) => (world.stored[n][cell] = frame[name][i])));
     world.moment++;
     const last = this.kept[this.kept.length - 1];
     if (world.moment >= (last ? last.moment + this.keepEvery : 0)) {
       const { ground, kinds, stored } = world;
-      this.kept.push({ moment: world.moment, ground: ground.slice(), kinds: kinds.slice(), stored: stored.slice() });
+      this.kept.push({ moment: world.moment, ground: ground.slice(), kinds: kinds.slice(), stored: stored.map((one) => one.slice()) });
       if (this.kept.length > this.mostKept) {
         this.kept = this.kept.filter((_, i) => i % 2 === 0);
         this.keepEvery *= 2;

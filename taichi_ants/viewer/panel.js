@@ -41,7 +41,7 @@ class Panel {
   constructor(history, stage, choose, signal) {
     this.history = history;
     this.stage = stage;
-    this.choose = choose; // {follow(number), unfollow(), cell(cell), other(step), aim()}
+    this.choose = choose; // {follow(number), unfollow(), cell(cell), other(step), aim(), pheromone(number)}
     byId("about").innerHTML = history.header.about
       .map(([name, value]) => `<dt>${safe(name)}</dt><dd>${safe(value)}</dd>`).join("");
     document.querySelector(".panel").addEventListener("click", (event) => {
@@ -54,6 +54,7 @@ class Panel {
       if (pressed === "ant-close") choose.unfollow();
       if (pressed === "cell-close") choose.cell(-1);
     }, { signal });
+    byId("legend").addEventListener("change", ({ target }) => choose.pheromone(target.selectedIndex), { signal });
   }
 
   show(moment, followed, cell, aims) {
@@ -123,7 +124,7 @@ class Panel {
   viewOf(ant) {
     const { header, world } = this.history;
     const { task, rest, letters } = this.history.stateName(ant.state);
-    const { pheromone, seen_by: seenBy } = header, cue = this.cueOf(ant), own = cue === pheromone;
+    const { name: pheromone, seen_by: seenBy } = this.history.pheromone, cue = this.cueOf(ant), own = cue === pheromone;
     let hides = false; // whether the ant does not see a trail that exists
     const shapes = header.view.map((turn, i) => {
       const angle = (turn * Math.PI) / 3, x = 1.732 * Math.sin(angle), y = -1.732 * Math.cos(angle);
@@ -224,7 +225,7 @@ class Panel {
       `${link(number)} (${history.header.actions[action]}${several ? ", here or next to it" : ""}${["BLOCKED", "FAILED"].includes(event) ? ", failed" : ""})`);
     const lines = [
       ["contains", ants.length ? ants.map(link).join(", ") : holds],
-      [safe(history.header.pheromone), `${plain(level, Number.isInteger(level) ? 0 : 2)} (darkest from ${history.header.strongest})`],
+      [safe(history.pheromone.name), `${plain(level, Number.isInteger(level) ? 0 : 2)} (darkest from ${history.pheromone.strongest})`],
       ["next actions", wanting.join(", ") || "none"],
     ];
     card.innerHTML = `<div class="head"><h2>Cell (${history.grid.cube(cell).join(", ")})</h2>`
@@ -260,10 +261,13 @@ class Panel {
       `${cell("var(--food-floor)", drawing(this.stage.colours[ofKind(kind)], CRUMBS))}${safe(name)}`);
     const faded = this.history.header.marks.map(({ words, most }) =>
       `${bodies[0].replace("<svg", '<svg opacity=".4"')}${safe(most === null ? `${words} ant` : `ant with little ${words}`)}`);
+    const { pheromones } = this.history.header, { pheromone } = this.history;
+    const several = pheromones.length < 2 ? safe(pheromone.name) : `<select id="shown" aria-label="Pheromone that the page shows">${pheromones.map((one) =>
+      `<option${one === pheromone ? " selected" : ""}>${safe(one.name)}</option>`).join("")}</select>`;
     byId("legend").innerHTML = [
       `${bodies[0]}ant`, `${bodies[1]}ant with food`, ...faded, ...kinds,
       `${cell("var(--queen-floor)", drawing("var(--queen)", CROWN))}queen`, `${cell("var(--rock)")}rock`,
-      `<span class="ramp"></span>${safe(this.history.header.pheromone)}`, ...nests,
+      `<span class="ramp"></span>${several}`, ...nests,
     ].map((item) => `<li>${item}</li>`).join("");
     document.querySelector(".ramp").style.background = `linear-gradient(to right,${samples.join()})`;
   }

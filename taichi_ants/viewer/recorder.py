@@ -14,7 +14,7 @@ import numpy as np
 from taichi_ants import learners
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.results import Trace
-from taichi_ants.errors import AntsError, check_one_of, count, expect
+from taichi_ants.errors import AntsError, count, expect
 from taichi_ants.features import used_by
 from taichi_ants.features.feature import Feature, Mark
 from taichi_ants.rendering.scene import name_parts
@@ -22,7 +22,6 @@ from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import COMPASS, TRAIL
-from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.viewer.frames import Recording, pack, types_of
 
 _MOST_NAMES = 4096  # states up to which a header names all states, seen or not
@@ -40,10 +39,9 @@ class Recorder:
         world: The number of the world.
         title: The title of the page; "" for a description of the colony.
         follow: The number of the ant that the page follows at first.
-        pheromone: The name of the pheromone that the page shows: the trail, or a field.
 
     Raises:
-        AntsError: `world` is not the number of a world, or `pheromone` not the name of a field.
+        AntsError: `world` is not the number of a world.
     """
 
     def __init__(
@@ -52,16 +50,14 @@ class Recorder:
         world: int = 0,
         title: str = "",
         follow: int | None = None,
-        pheromone: str = TRAIL,
     ) -> None:
         expect("colony", colony, Colony)
         expect("title", title, str)
-        check_one_of("pheromone", pheromone, (TRAIL, *colony.task.fields))
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
-        self.pheromone = pheromone
         self.grid, self._n_states = colony.snapshot(world).grid, colony.task.n_states
         self._learns, owners = colony.sharing != "frozen", colony.owners
-        self.types = types_of(self.grid.size, self._n_states, self._rule.dense)
+        dense = (one.dense for one in colony.pheromones)
+        self.types = types_of(self.grid.size, self._n_states, *dense)
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables that were sent
         self._owners = np.full(owners, -1) if colony.one_a_slot else np.arange(owners)
         # For curves: the first episode, the ticks until the last end that was noted, its episode.
@@ -75,7 +71,8 @@ class Recorder:
         """Begin with the data of a page that has read no frames."""
         self._numbers, self._queens = (np.zeros(0, np.int32) for _ in range(2))
         self._ground, self._kinds = (np.zeros(self.grid.size, np.uint8) for _ in range(2))
-        self._trail = np.zeros(self.grid.size)  # levels of the pheromone, as they are stored
+        # The pheromones, as they are stored.
+        self._trails = [np.zeros(self.grid.size) for _ in self.colony.pheromones]
         self._table = np.full((len(self._known), N_ACTIONS), np.nan, np.float32)
 
     @property
@@ -106,11 +103,6 @@ class Recorder:
             self._before, self._ended = ticks, colony.episode
 
     @property
-    def _rule(self) -> Pheromone:
-        """The rules of the pheromone that the page shows."""
-        return self.colony.pheromones[self.colony.task.number_of(self.pheromone)]
-
-    @property
     def _marks(self) -> list[tuple[Feature, Mark]]:
         """The marks of the features of the task."""
         return [(feature, mark) for feature in used_by(self.colony.task) for mark in feature.marks]
@@ -124,12 +116,19 @@ class Recorder:
         by_letters = colony.has_training and not is_own and not task.noise.misread
         names = (TRAIL, *task.fields, COMPASS)  # the number of the compass is -1
         return {
-            "format": 5,
+            "format": 6,
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
             "ranges": list(self.grid.ranges),
             "types": self.types,
-            "strongest": self._rule.darkest,
-            "pheromone": self.pheromone,
+            # `seen_by` is its view, "" if an ant may know more or less than its letters say.
+            "pheromones": [
+                {
+                    "name": name,
+                    "strongest": one.darkest,
+                    "seen_by": one.view if by_letters else "",
+                }
+                for name, one in zip(names, colony.pheromones, strict=False)
+            ],
             "nests": colony.n_nests,
             "n_states": self._n_states,
             "names": self.names(),
@@ -145,8 +144,6 @@ class Recorder:
             ],
             "rule": task.choice.rule,
             "values": colony.has_training,  # whether ants choose by action values
-            # The view of the pheromone, "" if an ant may know more or less than its letters say.
-            "seen_by": self._rule.view if by_letters else "",
             "groups": [  # of ants: the castes, or one of all ants
                 {
                     "cues": [names[cue] for cue in task.cues_of(caste)],
@@ -181,11 +178,9 @@ class Recorder:
             "observation": f"{task.sees.name}, {self._n_states} states",
             "nests": str(colony.n_nests) if colony.n_nests > 1 else "",
             "castes": ", ".join(task.castes),
+            "fields": ", ".join(task.fields),
             "kinds of food": ", ".join(task.foods),
         }
-        if colony.task.fields:
-            hidden = [name for name in (TRAIL, *colony.task.fields) if name != self.pheromone]
-            lines["pheromone"] = f"{self.pheromone}; hidden: {', '.join(hidden)}"
         if self._learns:
             lines["learner"] = learners.label(config.learner)
             groups = {"nest": colony.n_nests, "caste": len(task.castes)}
@@ -301,14 +296,19 @@ class Recorder:
         rates = (colony.epsilon, colony.learning_rate)
         delivered = colony.delivered[self.world] + totals[0]
         counts = (len(numbers), delivered, self.ticks)
-        stored, clock = colony.stored_trail(self.world, self.pheromone)
-        sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, clock)
+        stored = [colony.stored_trail(self.world, name) for name in (TRAIL, *colony.task.fields)]
+        clocks = [clock for _, clock in stored]
+        sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, *clocks)
         sections["progress"], self._new = self._new, []
-        layers = {"ground": snapshot.ground, "kinds": snapshot.food_kinds, "trail": stored}
+        layers = {"ground": snapshot.ground, "kinds": snapshot.food_kinds}
         for name, layer in layers.items():
             cells = np.flatnonzero(getattr(self, f"_{name}") != layer)
             sections |= {f"{name}_at": cells, name: layer[cells]}
             setattr(self, f"_{name}", layer)
+        for number, (layer, _) in enumerate(stored):
+            cells, name = np.flatnonzero(self._trails[number] != layer), f"trail{number or ''}"
+            sections |= {f"{name}_at": cells, name: layer[cells]}
+        self._trails = [layer for layer, _ in stored]
         sections |= self._table_changes(slots, numbers, sections["states"])
         return pack(self.types, sections)
 
@@ -339,7 +339,6 @@ def record_colony(
     world: int = 0,
     title: str = "",
     follow: int | None = None,
-    pheromone: str = TRAIL,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Return a recording of a colony's next ticks; other arguments are those of `Recorder`.
@@ -354,7 +353,7 @@ def record_colony(
         AntsError: A number is not allowed, or no episode has begun.
     """
     between, done = intervals(colony, ticks, frame_interval, follow), 0
-    recorder = Recorder(colony, world, title, follow, pheromone)
+    recorder = Recorder(colony, world, title, follow)
     frames = [recorder.snapshot()]
     for n in between:
         frames.append(recorder.tick(n))

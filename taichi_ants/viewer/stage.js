@@ -66,7 +66,7 @@ class Stage {
 
   /* The colour of a trail, by its share of the strongest one. */
   trailColour(level) {
-    return Math.round(Math.min(level / this.history.header.strongest, 1) * 255);
+    return Math.round(Math.min(level / this.history.pheromone.strongest, 1) * 255);
   }
 
   /* Read the size from the page; return whether it has changed. */

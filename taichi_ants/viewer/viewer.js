@@ -75,6 +75,7 @@ class Viewer {
     this.panel = new Panel(this.history, this.stage, {
       follow: (number) => this.follow(number), unfollow: () => this.follow(-1),
       cell: (cell) => this.chooseCell(cell), other: (step) => this.followOther(step), aim: () => this.toggleAim(),
+      pheromone: (number) => this.choosePheromone(number),
     }, signal);
     this.timeline = new Timeline(this.history, this.player, signal);
     if (this.source.live) document.querySelector(".about summary").textContent = "About this session";
@@ -219,6 +220,12 @@ class Viewer {
     const dark = theme ? theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
     byId("theme").setAttribute("aria-label", `Theme: ${theme || "same as the system"}`);
     this.wear(dark ? "dark" : "light");
+  }
+
+  choosePheromone(number) {
+    this.history.shown = number;
+    History.chosen = this.history.pheromone.name;
+    this.dirty = true;
   }
 
   wear(theme) {

@@ -6,6 +6,7 @@ import contextlib
 import functools
 import json
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from taichi_ants import (
     TrainingConfig,
     World,
     load_policy,
+    rules,
 )
 from taichi_ants import task as tasks
 from taichi_ants.files import archives
@@ -28,6 +30,8 @@ from taichi_ants.learners.policies import trail_follower
 from taichi_ants.live import session as session_module
 from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
+from taichi_ants.rules.rule import RULES
+from taichi_ants.settings import Setting
 from taichi_ants.viewer import Recording
 from taichi_ants.viewer.frames import CLOCK, POINT
 from taichi_ants.worlds import text_map
@@ -43,6 +47,16 @@ HOMING = tasks.foraging().replace(
     fields={"home": {"deposited_when": "without_food", "evaporation": "exponential"}},
     homing_cue="home",
 )
+
+
+@rules.register("deposit")
+def live_bump(
+    level, most: Annotated[int, Setting("largest level", least=1, most=900)] = 400, share=0.5
+):
+    return min(level + most * share, most)
+
+
+OWN = HOMING.replace(pheromone={"deposit": "live_bump"})
 TWO_NESTS = text_map.to_text(
     World((7, 7, 7), [(0, 6, 0), (6, 0, 3)], [(0, 0, 5), (1, 0, 5), (5, 5, 0)], [(0, 3, 0)])
 )
@@ -59,10 +73,19 @@ SETUPS = {
     ),
     "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="independent"),
     "nests": Setup(TWO_NESTS, tasks.foraging(), LEARNS, 20, 40, 3, 25),
-    "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL, pheromone="home"),
+    "rules": Setup("open", OWN, LEARNS, 20, world_settings=SMALL),
+    "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL),
 }
+BUMP = RULES.yours.pop("live_bump")  # registered only while the tests of this file run
 LATER = ("queueing", "lively")
 MARKED = [pytest.param(one, marks=[pytest.mark.slow] * (one in LATER)) for one in SETUPS]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _registered():
+    RULES.add("live_bump", BUMP)
+    yield
+    RULES.yours.pop("live_bump")
 
 
 def with_edits(setup: Setup, n: int, seed: int = 0) -> Session:
@@ -150,7 +173,9 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
     for one in (undone, again):
         one.advance(10)
         (seen,) = played(Recording(one.header(), [one.snapshot()]))
-        assert np.array_equal(seen.trail, one.colony.snapshot().fields[session.setup.pheromone])
+        present = list(one.colony.snapshot().fields.values())
+        assert len(seen.fields) == len(present)
+        assert all(map(np.array_equal, seen.fields, present))
     assert undone.same(again)
     assert session.interventions.state() == stands
 
@@ -209,7 +234,8 @@ def test_a_page_that_joins_late_sees_what_the_others_see(name):
         assert set((owners * n_states + b.states).tolist()) <= known
     snapshot = session.colony.snapshot()
     assert np.array_equal(joined[-1].ground, snapshot.ground)
-    assert np.array_equal(joined[-1].trail, snapshot.fields[session.setup.pheromone])
+    assert len(joined[-1].fields) == len(snapshot.fields)
+    assert all(map(np.array_equal, joined[-1].fields, snapshot.fields.values()))
 
 
 def test_a_recording_holds_what_happened(edited):
@@ -259,6 +285,24 @@ WRONG = [
     ({"task": {"pheromone.half_life": 9}}, "half_life` is 9.0; leave"),
     ({"ants": 41}, "ants is 41"),
 ]
+
+
+def test_parameters_of_own_rules_have_values_that_change_while_ants_run():
+    session = Session(SETUPS["rules"])
+    values = session.values()
+    assert values["live_bump.most"] | {"help": ""} == {
+        **{"value": 400, "least": 1, "most": 900, "step": 1},
+        **{"path": "task.rules.live_bump.most", "edits": None, "help": ""},
+    }
+    assert "largest level" in values["live_bump.most"]["help"]
+    share = values["live_bump.share"]
+    assert share["least"] == 0 < share["value"] == 0.5 < share["most"]
+    session.apply({"task": {"rules.live_bump.most": 7}})
+    session.advance(30)
+    assert session.values()["live_bump.most"]["value"] == 7
+    assert session.colony.snapshot().trail.max() <= 7
+    assert session.colony.snapshot().fields["home"].max() > 7
+    assert "901" in refused(session, {"task": {"rules.live_bump.most": 901}})
 
 
 def refused(session: Session, edit: object) -> str:

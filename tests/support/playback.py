@@ -35,6 +35,7 @@ class Played:
         ground, trail: The contents and trail levels of all cells.
         values: Changed action values, by entry.
         nests: The nests of the living ants.
+        fields: The levels of all pheromones in order, the trail first.
     """
 
     clock: list[float]
@@ -50,6 +51,7 @@ class Played:
     trail: np.ndarray
     values: dict[int, float] = field(default_factory=dict)
     nests: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    fields: list[np.ndarray] = field(default_factory=list)
 
     def row(self, state: int, n_states: int, owner: int = 0) -> np.ndarray:
         """Return the action values of a state, float32 (5,)."""
@@ -61,16 +63,18 @@ def played(recording: Recording) -> Iterator[Played]:
     """Yield every moment of a recording."""
     grid = AxialGrid(tuple(recording.header["ranges"]))
     ground = np.zeros(grid.size, np.uint8)
-    stored = np.zeros(
-        grid.size, unpack(recording.header["types"], recording.frames[0])["trail"].dtype
-    )
+    names = [f"trail{n or ''}" for n in range(len(recording.header["pheromones"]))]
+    stored = [np.zeros(grid.size, f"<{recording.header['types'][name]}") for name in names]
     values: dict[int, float] = {}
     numbers = np.zeros(0, np.int32)
     for moment in range(len(recording)):
         frame = unpack(recording.header["types"], recording.frames[moment])
         clock = frame["clock"].tolist()
         ground[frame["ground_at"]] = frame["ground"]
-        stored[frame["trail_at"]] = frame["trail"]
+        for levels, name in zip(stored, names, strict=True):
+            levels[frame[f"{name}_at"]] = frame[name]
+        clocks = zip(stored, clock[9:], strict=True)
+        fields = [np.maximum(levels - levels.dtype.type(at), 0) for levels, at in clocks]
         entries = frame["table_at"].astype(np.int64).tolist()
         values |= dict(zip(entries, frame["table"].tolist(), strict=True))
         if len(frame["numbers"]):
@@ -88,9 +92,10 @@ def played(recording: Recording) -> Iterator[Played]:
             frame["acts"] >> 4,
             frame["td_errors"],
             ground.copy(),
-            np.maximum(stored - stored.dtype.type(clock[9]), 0),
+            fields[0],
             dict(values),
             (frame["poses"] >> 4).astype(int),
+            fields,
         )
 
 

@@ -40,7 +40,7 @@ def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[
     if kind == "set":
         known = edits.values(interventions)
         name = str(rng.choice(list(known)))
-        value, least, most, step, path, switch = known[name]
+        value, least, most, step, path, switch, _ = known[name]
         drawn = float(rng.choice([value, least, most, rng.uniform(least, most)]))
         if name == "ants":
             drawn = float(rng.integers(1, interventions.ants + 4))

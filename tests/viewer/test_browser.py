@@ -13,7 +13,7 @@ from playback import played
 from taichi_ants import Colony, Task, TrainingConfig, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
-from taichi_ants.task import Life, Pheromone
+from taichi_ants.task import Life, Pheromone, foraging
 from taichi_ants.task.constants import ACTION_NAMES
 from taichi_ants.task.events import Event
 from taichi_ants.viewer import Recording, page, record_colony, record_trace
@@ -258,6 +258,29 @@ def test_a_page_on_which_nothing_changes_rests(ant):
     assert ant.read(frames) > 2
     ant.tab.keyboard.press("Space")
     ant.settle()
+
+
+def test_the_legend_chooses_the_pheromone(browser, folder):
+    home = {"deposited_when": "without_food", "evaporation": "exponential", "level": 500}
+    task = foraging().replace(fields={"home": home}, homing_cue="home")
+    learner = TrainingConfig("q_learning", 0.2, 0.9, 0.2, 1.0)
+    colony = Colony(worlds.open_world(4, (12, 12, 12)), task, learner, 3, ants=25)
+    colony.begin_episode()
+    recording = record_colony(colony, 70)
+    levels = [list(one.fields) for one in played(recording)]
+    present = colony.snapshot().fields
+    assert all(np.array_equal(a, b) for a, b in zip(levels[-1], present.values(), strict=True))
+    page = Page(browser, written(folder, "fields", recording))
+    try:
+        page.tab.focus("#shown")
+        for number in (1, 0):
+            page.press("ArrowDown" if number else "ArrowUp")
+            for moment in (70, 3, 40):
+                shown = page.read("(at) => [...viewer.history.worldAt(at).trail]", moment)
+                assert np.allclose(shown, levels[moment][number])
+            assert page.read("viewer.history.pheromone.name") == ("trail", "home")[number]
+    finally:
+        page.close()
 
 
 def test_light_and_dark(browser, episode):
