@@ -131,12 +131,13 @@ class Scene:
         letters, margin = round(shorter / 38), max(2, round(shorter / 60))
         self._panel: tuple[int, int, int] | None = None  # left edge, width, text size
         room = width  # pixels for the world, on the left
+        self._page = np.full((self._height, width, 3), colours.channels(colours.PAGE))
         if overlay and letters >= text.SMALLEST:
             room -= _PANEL_WIDTH * letters + margin
             self._panel = room, width - margin - room, letters
-        self._width, self._margin = width, margin
-        self._legend: tuple[list[_Entry], str, np.ndarray, np.ndarray]
-        self._legend = [], "", np.zeros(0), np.zeros(0)
+        self._margin = margin
+        self._legend: tuple[list[_Entry], str, np.ndarray]
+        self._legend = [], "", np.zeros(0)
         beyond = view and overlay
         self._rasteriser = Rasteriser(grid, room, self._height, margin, beyond, scales)
 
@@ -156,7 +157,7 @@ class Scene:
         world = self._draw_world(snapshot, status)
         if self._panel is None:
             return world
-        frame = np.full((self._height, self._width, 3), colours.channels(colours.PAGE))
+        frame = self._page.copy()
         frame[:, : world.shape[1]] = world
         left, width, size = self._panel
         text.write(frame, self._title, left, self._margin + size, size, room=width)
@@ -171,15 +172,15 @@ class Scene:
         assert self._panel is not None
         entries = [*self._further_entries(snapshot), *_LEGEND]
         most = f"{self._rasteriser.darkest(TRAIL, snapshot.trail)} and more"
-        empty = colours.channels(colours.PAGE)
         if self._legend[:2] != (entries, most):
-            page = np.full(frame.shape, empty)
+            page = self._page.copy()
             self._draw_legend(page, entries, most, *self._panel)
-            where = (page != empty).any(axis=2)
-            self._legend = entries, most, page[where], where
-        *_, pixels, where = self._legend
-        if (frame[where] == empty).all():
-            frame[where] = pixels
+            rows, columns, _ = (page != self._page).nonzero()
+            self._legend = entries, most, page[rows.min() :, columns.min() :]
+        legend = self._legend[2]
+        corner = np.s_[-legend.shape[0] :, -legend.shape[1] :]
+        if (frame[corner] == self._page[corner]).all():
+            frame[corner] = legend
         else:  # in a small picture, it covers a part of the status
             self._draw_legend(frame, entries, most, *self._panel)
 
