@@ -30,7 +30,7 @@ def never() -> bool:
 
 
 @pytest.mark.parametrize(
-    ("render", "encode", "ticks"), [("a.gif", "_gif", 6), ("a.png", "png", 20)]
+    ("render", "encode", "ticks"), [("a.gif", "_with_palette", 6), ("a.png", "png", 20)]
 )
 def test_a_colony_is_saved_although_its_picture_cannot_be(
     tmp_path, monkeypatch, render, encode, ticks
