@@ -7,9 +7,13 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from taichi_ants.errors import AntsError, count
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import whole_number
@@ -22,6 +26,8 @@ if TYPE_CHECKING:
     from taichi_ants.learners.policies import Policy
 
 _LEARNING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0)  # the default
+FRAMES_PER_SECOND = 12.0
+_PIECE_SECONDS = 0.2
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 _OF_RESUMED = ("resume", "ticks", "frame_interval", "plugin", "threads", "arch", "save", "render")
 
@@ -84,7 +90,6 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def run(settings: argparse.Namespace) -> None:
     """Run a colony and print a summary; a signal stops it between two ticks."""
     from taichi_ants import Colony
-    from taichi_ants.studies.one_colony import check_places, live, summary
 
     load_plugin(settings.plugin)
     files = settings.save, settings.render
@@ -107,7 +112,7 @@ def run(settings: argparse.Namespace) -> None:
 
 def new_colony(settings: argparse.Namespace) -> Colony:
     """Return a new colony from the settings, at the start of its episode."""
-    from taichi_ants import AntsError, Colony, load_policy, worlds
+    from taichi_ants import Colony, load_policy, worlds
 
     given = command_line.given_settings(settings)
     world = worlds.build(settings.world, **{"seed": settings.seed, **given.get("world", {})})
@@ -138,3 +143,95 @@ def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
     if policy:
         base = replace(base, observation=policy.observation)
     return base.replace(**command_line.given_settings(settings).get("task", {}))
+
+
+def check_places(save: str | None, render: str | None) -> None:
+    """Check, before the work begins, that the files of `live` can be written."""
+    from taichi_ants.files import check_writable_file
+    from taichi_ants.rendering import check_animation
+
+    if render is not None:
+        check_animation(render, FRAMES_PER_SECOND)
+    if save is not None:
+        check_writable_file(save)
+
+
+def live(
+    colony: Colony,
+    ticks: int,
+    progress: Callable[[float], None],
+    stopped: Callable[[], bool],
+    save: str | None = None,
+    render: str | None = None,
+    frame_interval: int = 2,
+) -> None:
+    """Run a colony for `ticks` ticks, or until `stopped()` is true, and write its files.
+
+    `save` is the file of the colony, which is saved even if drawing fails. `render` is a picture
+    (.png) of the end, or an animation (.gif).
+    """
+    from taichi_ants.files import check_writable_folder
+    from taichi_ants.rendering import colony_snapshots, frames, save_animation, save_picture
+    from taichi_ants.rendering.writers import is_picture
+
+    animated = render is not None and not is_picture(render)
+    interval = frame_interval if animated else ticks
+    error: Exception | None = None
+    passing = _pieces(colony, ticks, progress, stopped, interval)
+    try:
+        if render and animated:
+            shown = (s for _ in chain([0], passing) for s in colony_snapshots(colony))
+            save_animation(render, frames(shown, task=colony.task), FRAMES_PER_SECOND)
+        for _ in passing:
+            pass
+        if render and not animated:
+            save_picture(render, next(frames(colony_snapshots(colony), task=colony.task)))
+    except (AntsError, OSError) as raised:
+        error = raised  # the colony is intact, because drawing happens between ticks
+    if save is not None:
+        check_writable_folder(Path(save).parent)
+        colony.save(save)
+    if error is not None:
+        raise error
+
+
+def _pieces(
+    colony: Colony,
+    ticks: int,
+    progress: Callable[[float], None],
+    stopped: Callable[[], bool],
+    interval: int,
+) -> Iterator[int]:
+    """Run a colony in short pieces, so that it can be stopped between them.
+
+    Yields after every `interval` ticks and at the end.
+    """
+    begun, piece, passed, ends = colony.ticks, 1, 0, stopped()
+    while not ends:
+        began = time.perf_counter()
+        now = min(piece, ticks - passed, interval - passed % interval)
+        colony.tick(now)
+        took, passed = time.perf_counter() - began, colony.ticks - begun
+        if took > _PIECE_SECONDS:
+            piece = max(1, piece // 2)
+        elif now == piece:
+            piece *= 2
+        ends = passed == ticks or stopped()
+        if ends or passed % interval == 0:
+            yield colony.ticks
+        progress(passed / ticks)
+
+
+def summary(colony: Colony, ticks: int, seconds: float) -> str:
+    """Return a summary of two lines for a run of `ticks` ticks that took `seconds`."""
+    outcome = {name: int(array.sum()) for name, array in colony.outcome().counts().items()}
+    blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
+    changes = [count(outcome[f"{n}s"], n) for n in ("birth", "death") if outcome[f"{n}s"]]
+    changes += [f"{outcome['regrown']} regrown"] if outcome["regrown"] else []
+    colonies = f" in {len(colony.seeds):,} colonies" if len(colony.seeds) > 1 else ""
+    living = f"{outcome['living']:,} ant{'s' if outcome['living'] != 1 else ''}{colonies}"
+    return (
+        f"{living}, {count(ticks, 'tick')} in {seconds:.1f} s.\n"
+        f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, "
+        f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}."
+    )

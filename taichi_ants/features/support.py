@@ -36,7 +36,7 @@ BASE = LONE | CHOICE | FIELDS | FOODS | CASTES | OWN_RULES
 BASE |= {"pheromone.evaporation", "pheromone.half_life", "pheromone.diffusion"}
 BASE |= {"pheromone.deposit", "nests"}
 BASE |= {"life.births", "life.lifespan", "life.regrowth", "life.pile_move_interval"}
-COLONY = BASE | {feature.name for feature in FEATURES}
+COLONY = BASE | {feature.group for feature in FEATURES}
 
 
 def refuse_unsupported(

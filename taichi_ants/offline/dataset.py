@@ -145,15 +145,27 @@ class Dataset(Record):
         """Write a .npz file; raises as `archives.write` does."""
         arrays = {name: getattr(self, name) for name in COLUMNS}
         arrays = {n: small(a) if a.dtype.kind == "i" else a for n, a in arrays.items()}
-        facts: dict[str, Any] = {"world": self.world.as_dict(), "task": self.task.as_dict()}
-        facts |= {"seeds": self.seeds, "behaviour": dict(self.behaviour)}
-        _KIND.write(path, facts, arrays)
+        _KIND.write(path, self.facts(), arrays)
 
     @classmethod
     def load(cls, path: PathLike) -> Dataset:
         """Return a data set that `save` wrote; raise AntsError if the file is not valid."""
         with _KIND.reading(path) as (arrays, facts):
             rows: dict[str, Any] = {n: arrays[n].astype(kind) for n, kind in COLUMNS.items()}
-            expect("behaviour", facts["behaviour"], dict)
-            world, task = World.from_dict(facts["world"]), Task.from_dict(facts["task"])
-            return cls(world, task, checked_seeds(facts["seeds"]), facts["behaviour"], **rows)
+            return cls(**cls.described(facts), **rows)
+
+    def facts(self) -> dict[str, Any]:
+        """Return everything except the transitions, for files; `described` reads it."""
+        facts = {"world": self.world.as_dict(), "task": self.task.as_dict()}
+        return {**facts, "seeds": self.seeds, "behaviour": dict(self.behaviour)}
+
+    @staticmethod
+    def described(facts: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the fields of a data set that `facts` holds."""
+        expect("behaviour", facts["behaviour"], dict)
+        return {
+            "world": World.from_dict(facts["world"]),
+            "task": Task.from_dict(facts["task"]),
+            "seeds": checked_seeds(facts["seeds"]),
+            "behaviour": facts["behaviour"],
+        }

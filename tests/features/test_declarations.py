@@ -51,6 +51,23 @@ def test_a_hook_has_the_arguments_of_its_point():
             return action
 
 
+def plain_calls(source: str) -> set[str]:
+    """Return the plain functions of a file that hooks call; kernels would run them as Python."""
+    functions = [node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]
+    in_kernels = [node for node in functions if node.decorator_list]
+    plain = {node.name for node in functions} - {node.name for node in in_kernels}
+    calls = [node for hook in in_kernels for node in ast.walk(hook) if isinstance(node, ast.Call)]
+    return plain & {ast.unparse(call.func) for call in calls}
+
+
+def test_hooks_call_no_plain_functions():
+    assert plain_calls("def f(x):\n return x\n@F.at('born')\ndef g(a):\n a.x = f(1)") == {"f"}
+    files = sorted((PACKAGE / "features").glob("*.py"))
+    assert len(files) > 6
+    for path in files:
+        assert not plain_calls(path.read_text("utf-8")), path.name
+
+
 def identifiers(path: Path) -> set[str]:
     """Return the names, attributes, arguments and texts of a file."""
     found = set()

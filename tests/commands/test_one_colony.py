@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, worlds
+from taichi_ants.commands.colony import live, summary
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.rendering import writers
 from taichi_ants.studies.interruption import held, stoppable
-from taichi_ants.studies.one_colony import live, summary
 
 TASK = Task(delivery="truncates", evaporation_in_training=True)
 TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
@@ -30,7 +30,7 @@ def never() -> bool:
 
 
 @pytest.mark.parametrize(
-    ("render", "encode", "ticks"), [("a.gif", "_gif", 6), ("a.png", "png", 20)]
+    ("render", "encode", "ticks"), [("a.gif", "_with_palette", 6), ("a.png", "png", 20)]
 )
 def test_a_colony_is_saved_although_its_picture_cannot_be(
     tmp_path, monkeypatch, render, encode, ticks
