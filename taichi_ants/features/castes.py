@@ -36,7 +36,7 @@ class Caste(Settings, path="task.castes.NAME"):
     fixed threshold.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "share": "It has the share {share} of the ants of a nest.",
         "ants": "It has {ants} ants in each nest at the start.",
         "nest": "Only nest {nest} has it.",

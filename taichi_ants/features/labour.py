@@ -61,7 +61,7 @@ class Labour(Settings, path="task.labour"):
     the probability `stop_probability` per tick. See `docs/colony.md`.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "rule=thresholds": "Each nest has a stimulus s, which is 0 at the start of an episode, "
         "rises by {demand} per tick, and falls by {relief} with each delivery, but not below 0. "
         "An idle ant with the threshold t starts to forage with the probability `s^{exponent} / "

@@ -23,7 +23,7 @@ class Life(Settings, path="task.life"):
     0, food grows back in the same tick.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "births": "The queen turns each food item that she receives into an ant on a free cell "
         "next to her.",
         "lifespan": "An ant dies at the age of {lifespan} ticks and leaves its food on its cell.",

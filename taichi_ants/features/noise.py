@@ -26,7 +26,7 @@ class Noise(Settings, path="task.noise"):
     index by which ants choose and learn, but not the results and rewards of actions.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "slip": "With probability {slip}, an ant executes any of the five actions instead of the "
         "chosen one.",
         "misread": "With probability {misread}, an ant sees a cell as one of the three other "

@@ -29,7 +29,7 @@ class TrainingConfig(Settings, path="training"):
     that the learner exists and has these hyperparameters.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "": "Ants learn action values, which start at {initial_q}. After a step from state s by "
         "action a, `Q(s, a)` changes by the learning rate times `target - Q(s, a)`. The discount "
         "is {discount}, and ε {epsilon} in the first episode.",

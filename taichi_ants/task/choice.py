@@ -31,7 +31,7 @@ class Choice(Settings, path="task.choice"):
     With "greedy" and "softmax", ants also explore: with probability epsilon, any action is taken.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "rule=greedy": "With probability ε, the exploration rate, an ant takes any of the five "
         "actions. Otherwise it takes one with the largest value `Q(s, a)`; ties are broken at "
         "random.",

@@ -55,7 +55,7 @@ class Field(Pheromone, path="task.fields.NAME"):
     start of the episode.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "deposited_when=with_food": "Ants deposit on each cell that they enter with food and, when "
         "they pick up food, on its cell and on their own.",
         "deposited_when=without_food": "Ants deposit on each cell that they enter without food "

@@ -21,7 +21,7 @@ class Food(Settings, path="task.foods.NAME"):
     last load is taken; `regrowth` ticks later, it has all its loads again.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "": "A cell has {loads} loads; the rewards are {pick_up} for picking up and {deliver} for "
         "giving.",
         "regrowth": "An empty cell has all its loads again after {regrowth} ticks.",

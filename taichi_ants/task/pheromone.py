@@ -42,7 +42,7 @@ class Pheromone(Settings, path="task.pheromone"):
       "strongest_under_carriers" also compares with trails under ants with food.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "evaporation=linear": "In each tick, the level c of each cell becomes `max(c - 1, 0)`.",
         "evaporation=exponential": "In each tick, the level of each cell is multiplied by `2^(-1 / "
         "{half_life})`; a level below 1 becomes 0.",

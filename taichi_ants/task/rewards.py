@@ -19,7 +19,7 @@ Reward = Annotated[int, Setting(least=-MOST_REWARD, most=MOST_REWARD)]
 class Rewards(Settings, path="task.rewards"):
     """The reward of each event, a whole number; by default, those of table 1 of the paper."""
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "": "The rewards are {empty} for a move onto E, {shaping} onto T or S, {pick_up} for "
         "picking up, {deliver} for giving, and {failed} for an action that fails.",
     }

@@ -49,7 +49,7 @@ class Traffic(Settings, path="task.traffic"):
     queue move at once; a ring of ants that claim each other's cells does not move.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "": "If several ants want a cell or a food item, one of them wins, by a hash of its cell "
         "and the tick. A move that fails turns the ant nevertheless.",
         "swap": "An ant with food that wins a cell changes places with an ant without food on it, "
@@ -111,7 +111,7 @@ class Task(Settings, path="task"):
     as numbers.
     """
 
-    sentences: ClassVar = {
+    sentences: ClassVar[dict[str, str]] = {
         "": "An ant sees a cell in view as O if it cannot be entered, as F (food) if the ant has "
         "no food, as Q (its queen) if it has, and else as E or as its cue: T without food, S with "
         "food. A move (left, forward, right) turns the ant and enters the cell there if that is "
