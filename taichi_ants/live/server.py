@@ -368,9 +368,13 @@ class SessionServer:
 
     def _send_whole(self, pages: Iterable[Page], begins: bool = True) -> None:
         """Send a complete frame to pages; with `begins`, also facts of the session."""
-        messages: list[str | bytes] = [_message("snapshot"), self.session.snapshot()]
+        messages: list[str | bytes] = [_message("snapshot"), self.session.recorder.whole()]
         if begins:
-            header, setup, choices = self.session.header(), self.session.setup, self.choices
+            header, setup, choices = (
+                self.session.recorder.header(),
+                self.session.setup,
+                self.choices,
+            )
             offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
             begin = _message("begin", session=self._shown, header=header, **offered)
             messages = [begin, self._state(), *messages]
@@ -379,7 +383,7 @@ class SessionServer:
 
     def _show(self, frame: bytes) -> None:
         """Send a frame to all pages except those that are behind."""
-        if new_names := self.session.new_state_names():
+        if new_names := self.session.recorder.new_names():
             self._send(_message("names", names=new_names))
         for page in self._pages:
             page.show(frame)

@@ -106,6 +106,7 @@ class Session:
         colony: The colony; only the session may advance it.
         edits: (steps, edit) of each edit, in order.
         changes: The index in `edits` of the first edit of each change; a stroke is one change.
+        recorder: Describes the session for pages, and makes their frames.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -123,15 +124,14 @@ class Session:
         self.colony.observe([])  # has no effect, but compiles kernels for the first edit
         # The title must not contain the number of ants, because interventions change it.
         title = f"Ants in a world of {self.colony.grid.count} cells"
-        self._recorder = Recorder(self.colony, title=title)
-        self._recorder.note()
-        self._recorder.snapshot()
-        self._named = set(self._recorder.names())
+        self.recorder = Recorder(self.colony, title=title)
+        self.recorder.note()
+        self.recorder.snapshot()
 
     @property
     def ticks(self) -> int:
         """The number of ticks in all episodes."""
-        return self._recorder.ticks
+        return self.recorder.ticks
 
     @property
     def steps(self) -> int:
@@ -143,28 +143,12 @@ class Session:
         """Whether the episode has ended; the next step begins another one."""
         return self.colony.ticks == self.interventions.length
 
-    def header(self) -> dict[str, Any]:
-        """Return facts about all frames, see `Recorder.header`."""
-        return self._recorder.header()
-
-    def new_state_names(self) -> dict[int, tuple[str, str, list[str]]]:
-        """Return the names of states that ants have visited since the last call."""
-        if len(self._named) == self.colony.task.n_states:
-            return {}
-        new = self._recorder.names(self._named)
-        self._named |= new.keys()
-        return new
-
-    def snapshot(self) -> bytes:
-        """Return a complete frame, for a page without frames."""
-        return self._recorder.whole()
-
     def advance(self, n: int = 1) -> bytes:
         """Return a frame of changes after up to n more ticks of this episode.
 
         If the episode has ended, the next one begins instead, without a tick.
         """
-        return self._run(checked_whole("n", n), self._recorder.tick) or self._recorder.snapshot()
+        return self._run(checked_whole("n", n), self.recorder.tick) or self.recorder.snapshot()
 
     def leap(self, n: int) -> bytes:
         """Return a frame of all changes after running n more steps, which may span episodes.
@@ -174,12 +158,12 @@ class Session:
         until = self.steps + checked_whole("n", n)
         while self.steps < until:
             self._run(until - self.steps, self.colony.tick)
-        return self._recorder.snapshot()
+        return self.recorder.snapshot()
 
     def _run(self, n: int, tick: Callable[[int], Any]) -> Any:
         """Advance with the function `tick`; return its result, None if no tick passes."""
         if self.ended:
-            self._recorder.note(ended=True)
+            self.recorder.note(ended=True)
             self._begun += 1  # first, because Ctrl-C during a launch raises an error after it
             self.interventions.begin_episode()
             return None
@@ -191,7 +175,7 @@ class Session:
             frame = tick(n)
         finally:  # also after an interrupt
             self._spent += time.perf_counter() - began
-        self._recorder.note()
+        self.recorder.note()
         return frame
 
     def apply(self, edit: object, goes_on: bool = False) -> bytes:
@@ -202,7 +186,7 @@ class Session:
         the edit is not valid or not possible; nothing has changed.
         """
         self._do(edit, goes_on)
-        return self._recorder.snapshot()
+        return self.recorder.snapshot()
 
     def _do(self, edit: object, goes_on: bool = False) -> None:
         intervention = edits.checked(edit, self.interventions)
@@ -214,7 +198,7 @@ class Session:
             self._take_snapshot()
         began = time.perf_counter()
         if "episode" in plain:
-            self._recorder.note(ended=True)
+            self.recorder.note(ended=True)
         # Recorded first, because Ctrl-C during a launch raises an error after it.
         if begins:
             self.changes.append(len(self.edits))
@@ -300,7 +284,7 @@ class Session:
             yield self
         yield from self._advance_to(steps)
         self.changes = list(changes)
-        self._recorder.snapshot()
+        self.recorder.snapshot()
         yield self
 
     def same(self, other: Session) -> bool:
@@ -335,7 +319,7 @@ class Session:
         changes = len({steps for steps, _ in log.edits})
         every = max(1, -(-(log.steps + changes) // most))
         session = cls(log.setup)
-        yield session, session.snapshot()
+        yield session, session.recorder.whole()
         for steps, edits_then in groupby([*log.edits, (log.steps, None)], lambda edit: edit[0]):
             while session.steps < steps:
                 if every == 1:
@@ -345,12 +329,12 @@ class Session:
                 for _ in session._advance_to(until):
                     pass
                 if session.steps % every == 0:
-                    yield session, session._recorder.snapshot()
+                    yield session, session.recorder.snapshot()
             edits_here = [edit for _, edit in edits_then if edit is not None]
             for edit in edits_here:
                 session._do(edit)
             if edits_here if every == 1 else steps == log.steps:
-                yield session, session._recorder.snapshot()
+                yield session, session.recorder.snapshot()
 
     def _advance_to(self, steps: int) -> Iterator[Session]:
         """Advance to a number of steps, in pieces of about `_REPLAY_SLICE` seconds."""

@@ -172,7 +172,7 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
     assert undone.ticks == again.ticks
     for one in (undone, again):
         one.advance(10)
-        (seen,) = played(Recording(one.header(), [one.snapshot()]))
+        (seen,) = played(Recording(one.recorder.header(), [one.recorder.whole()]))
         present = list(one.colony.snapshot().fields.values())
         assert len(seen.fields) == len(present)
         assert all(map(np.array_equal, seen.fields, present))
@@ -205,11 +205,11 @@ def test_snapshots_are_bounded_by_time_and_memory(monkeypatch):
 @pytest.mark.parametrize("name", MARKED)
 def test_a_page_that_joins_late_sees_what_the_others_see(name):
     session, rng = Session(SETUPS[name]), np.random.default_rng(4)
-    first, late, header = [session.snapshot()], [], session.header()
+    first, late, header = [session.recorder.whole()], [], session.recorder.header()
     for step in range(90):
         if step == 45:
-            late = [session.snapshot()]
-            header["names"] |= session.new_state_names()
+            late = [session.recorder.whole()]
+            header["names"] |= session.recorder.new_names()
         frame = session.advance()
         if step % 3 == 0:
             first.append(frame)
@@ -221,7 +221,7 @@ def test_a_page_that_joins_late_sees_what_the_others_see(name):
         first.append(frame)
         late += [frame] if late else []
     early = list(played(Recording(header, first)))
-    joined = list(played(Recording(session.header(), late)))
+    joined = list(played(Recording(session.recorder.header(), late)))
     for a, b in zip(early[-len(joined) :], joined, strict=True):
         assert a.clock == b.clock
         for field in ("numbers", "cells", "headings", "loaded", "states", "ground", "trail"):
@@ -395,7 +395,7 @@ def test_wrong_setups_say_why(changes, said):
 
 
 def clock(session: Session, frame: bytes) -> dict[str, float]:
-    types = session.header()["types"]
+    types = session.recorder.header()["types"]
     return dict(zip(CLOCK, unpack(types, frame)["clock"].tolist(), strict=True))
 
 
@@ -409,7 +409,9 @@ def test_a_late_page_is_told_of_the_whole_progress():
         session.apply({"episode": {}})
     *_, again = Session.replay(session.log())
     for one in (session, again):
-        points = unpack(one.header()["types"], one.snapshot())["progress"].reshape(-1, len(POINT))
+        points = unpack(one.recorder.header()["types"], one.recorder.whole())["progress"].reshape(
+            -1, len(POINT)
+        )
         ended = points[:, POINT.index("ended")] == 1
         named = [POINT.index(name) for name in ("episode", "ticks", "returns")]
         assert points[ended][:, named].tolist() == ends
@@ -436,7 +438,7 @@ def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
     types = few.header["types"]
     told = [
         unpack(types, frame)["clock"][CLOCK.index("delivered")]
-        for frame in (few.frames[-1], session.snapshot())
+        for frame in (few.frames[-1], session.recorder.whole())
     ]
     assert told == [counted, counted]
     assert counted > 0
