@@ -15,8 +15,7 @@ import numpy as np
 from taichi_ants.analysis.findings import Finding, Verdict
 from taichi_ants.analysis.tables import number
 from taichi_ants.report.odd import in_words
-from taichi_ants.viewer.frames import Recording
-from taichi_ants.viewer.page import content_policy, part
+from taichi_ants.viewer.page import Recording, content_policy, part
 
 _HERE = "taichi_ants.report"
 # Scripts of the viewer: the data of a recording, the picture of the world, and the playback.

@@ -22,7 +22,8 @@ from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import COMPASS, TRAIL
-from taichi_ants.viewer.frames import Recording, pack, types_of
+from taichi_ants.viewer.frames import pack, types_of
+from taichi_ants.viewer.page import Recording
 
 _MOST_NAMES = 4096  # states up to which a header names all states, seen or not
 _RESTS = 15  # the action of an ant that rests in frames
