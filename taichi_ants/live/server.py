@@ -277,9 +277,8 @@ class SessionServer:
         self._compiles = self.session.steps == 0
         if self._compiles:
             self._send(self._state())
-        step = [self.session.advance] if ticks == 1 else [self.session.leap, ticks]
         try:
-            self._show(await self._work(*step))
+            self._show(await self._work(self.session.advance, ticks))
         finally:
             if self._compiles:
                 self._compiles, self._next_state = False, 0.0  # send the new state at once

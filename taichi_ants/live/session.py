@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import pickle
 import tempfile
 import time
@@ -11,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from taichi_ants.viewer import Recorder
 _WRITER = "Session.save, or Save session on its page,"
 KIND = Kind("session", 4, _WRITER, most=5_000_000)
 _REPLAY_SLICE = 0.02  # seconds of a piece of a replay
-_SNAPSHOT_INTERVAL = 0.1  # seconds of simulation between snapshots, the longest replay of an undo
+_SNAPSHOT_INTERVAL = 0.1  # seconds between snapshots, the longest replay of an undo
 _MOST_KEPT = 1 << 28  # bytes of all snapshots
 _LARGEST = 1 << 26  # bytes of a colony above which there are no snapshots
 
@@ -88,14 +89,6 @@ class Log:
             )
 
 
-class _Snapshot(NamedTuple):
-    """A session before one of its changes."""
-
-    edits: int  # number of edits before the snapshot
-    spent: float  # seconds of simulation before the snapshot
-    content: bytes  # the session without its edits, pickled and compressed
-
-
 class Session:
     """A colony with all interventions since its first tick.
 
@@ -117,8 +110,9 @@ class Session:
         self.changes: list[int] = []
         self._cells = 0  # in all edits
         self._begun = 0  # episodes that began after one had ended
-        self._snapshots: list[_Snapshot] = []
-        self._spent = 0.0  # seconds of simulation so far
+        # The number of edits before, and the session without its edits, pickled and compressed.
+        self._snapshots: list[tuple[int, bytes]] = []
+        self._snapshot_time = -math.inf  # of the last snapshot, in seconds
         self.interventions.length = setup.ticks_per_episode or None
         self.interventions.begin_episode()
         self.colony.observe([])  # has no effect, but compiles kernels for the first edit
@@ -144,18 +138,14 @@ class Session:
         return self.colony.ticks == self.interventions.length
 
     def advance(self, n: int = 1) -> bytes:
-        """Return a frame of changes after up to n more ticks of this episode.
+        """Return a frame of changes after n more steps, which may span episodes.
 
-        If the episode has ended, the next one begins instead, without a tick.
-        """
-        return self._run(checked_whole("n", n), self.recorder.tick) or self.recorder.snapshot()
-
-    def leap(self, n: int) -> bytes:
-        """Return a frame of all changes after running n more steps, which may span episodes.
-
-        The frame does not have the actions of ants.
+        If an episode has ended, a step begins the next one, without a tick. The frame has the
+        actions of ants only if n is 1.
         """
         until = self.steps + checked_whole("n", n)
+        if n == 1 and not self.ended:
+            return self._run(1, self.recorder.tick)
         while self.steps < until:
             self._run(until - self.steps, self.colony.tick)
         return self.recorder.snapshot()
@@ -170,11 +160,7 @@ class Session:
         length = self.interventions.length
         n = min(n, length - self.colony.ticks) if length else n
         check_most("ticks", self.ticks + n)
-        began = time.perf_counter()
-        try:
-            frame = tick(n)
-        finally:  # also after an interrupt
-            self._spent += time.perf_counter() - began
+        frame = tick(n)
         self.recorder.note()
         return frame
 
@@ -196,7 +182,6 @@ class Session:
         begins = not (goes_on and self.changes)
         if begins:
             self._take_snapshot()
-        began = time.perf_counter()
         if "episode" in plain:
             self.recorder.note(ended=True)
         # Recorded first, because Ctrl-C during a launch raises an error after it.
@@ -210,25 +195,22 @@ class Session:
             del self.changes[len(self.changes) - begins :]
             raise
         self._cells += cells_of(plain)
-        self._spent += time.perf_counter() - began
 
     def _take_snapshot(self) -> None:
         """Take a snapshot of the session, unless a replay from the last snapshot would be quick.
 
-        If snapshots take too much memory, drop the one whose neighbours are closest in time.
+        If snapshots take too much memory, drop the oldest.
         """
-        snapshots = self._snapshots
-        is_near = snapshots and self._spent - snapshots[-1].spent < _SNAPSHOT_INTERVAL
-        if is_near or self.colony.nbytes > _LARGEST:
+        now = time.perf_counter()
+        if now - self._snapshot_time < _SNAPSHOT_INTERVAL or self.colony.nbytes > _LARGEST:
             return
         bare: Any = copy.copy(self)
         bare.setup, bare.edits, bare.changes, bare._snapshots = None, [], [], []
         content = zlib.compress(pickle.dumps(bare, pickle.HIGHEST_PROTOCOL), 1)
-        snapshots.append(_Snapshot(len(self.edits), self._spent, content))
-        while len(snapshots) > 1 and sum(len(kept.content) for kept in snapshots) > _MOST_KEPT:
-            spent = [0.0, *(snapshot.spent for snapshot in snapshots)]
-            gaps = [later - before for before, later in zip(spent, spent[2:], strict=False)]
-            del snapshots[gaps.index(min(gaps))]
+        self._snapshots.append((len(self.edits), content))
+        self._snapshot_time = now
+        while sum(len(content) for _, content in self._snapshots) > _MOST_KEPT:
+            del self._snapshots[0]
 
     def values(self) -> dict[str, dict[str, Any]]:
         """Return the values that sliders can change, by name, see `edits.Value`."""
@@ -300,11 +282,11 @@ class Session:
         if not self.changes:
             raise AntsError("there is nothing to undo: this session has no interventions.")
         *changes, last = self.changes
-        snapshots = [snapshot for snapshot in self._snapshots if snapshot.edits <= last]
+        snapshots = [(n, content) for n, content in self._snapshots if n <= last]
         if snapshots:
-            session = pickle.loads(zlib.decompress(snapshots[-1].content))
-            session.setup, session._snapshots = self.setup, snapshots
-            session.edits = self.edits[: snapshots[-1].edits]
+            n, content = snapshots[-1]
+            session = pickle.loads(zlib.decompress(content))
+            session.setup, session._snapshots, session.edits = self.setup, snapshots, self.edits[:n]
         else:
             session = Session(self.setup)
         steps, _ = self.edits[last]
