@@ -61,7 +61,7 @@ _QUIET.propagate = False
 _CHANGES = ("play", "step", "edit", "undo", "load", "back", "begin", "restart")
 
 _HEADERS = {
-    "Allow": "GET, HEAD",
+    "Allow": "GET",
     "Cache-Control": "no-store",
     "Content-Security-Policy": "frame-ancestors 'none'",  # the page itself contains the other rules
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -423,7 +423,7 @@ class SessionServer:
         # The origin of a socket must be this server. The page must not be requested by other pages.
         mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
         knows = hmac.compare_digest("".join(tokens[:1]).encode(), self.token.encode())
-        if method not in ("GET", "HEAD")[: 1 if opens else 2]:
+        if method != "GET":
             response = connection.respond(405, "Only GET is allowed here.\n")
         elif not mine or not (knows or (url.path == "/" and not tokens)):
             response = connection.respond(403, "Open the address that the command printed.\n")
@@ -439,8 +439,6 @@ class SessionServer:
             response.headers["Content-Type"] = "text/html; charset=utf-8"
         for name, value in _HEADERS.items():
             response.headers[name] = value
-        if method == "HEAD":
-            response.body = b""
         return response
 
     async def _handle_messages(self, connection: ServerConnection) -> None:

@@ -231,22 +231,6 @@ class Model:
         parts = [name.split(".") for name in self.rows[0]]
         return list(dict.fromkeys(part[2] for part in parts if part[:2] == ["task", group]))
 
-    def entities(self) -> list[Row]:
-        """Return the kinds of entities with their numbers in a world."""
-        ranges = (world["ranges"] for world in self.places)
-        cells = {x * y + y * z + z * x - x - y - z + 1 for x, y, z in ranges}
-        several = {
-            "castes of ants": self.entries("castes"),
-            "kinds of food": self.entries("foods"),
-            "further pheromones": self.entries("fields"),
-        }
-        return [
-            ("cells", _several(sorted(cells))),
-            ("nests, each with a queen", _several(sorted({*map(_nests, self.places)}))),
-            ("ants at the start", _several([row.get("ants", 1) for row in self.rows])),
-            *((words, f"{len(n)}: {', '.join(n)}") for words, n in several.items() if n),
-        ]
-
     def state_variables(self) -> list[Row]:
         """Return the state variables: entity, name, values and unit."""
         names = {row["task.observation"] for row in self.rows} & {*observations.names()}
@@ -302,14 +286,17 @@ def described(model: Model, command: str) -> str:
     rows, heads = model.parameters(), ("Parameter", "Value", "Unit", "Meaning")
     sizes = ("ranges", "foods", "obstacles", "trails", "ants")
     worlds = [
-        (*(str(world[size]) for size in sizes), str(_nests(world)), f"`{world['sha256'][:16]}`")
+        (
+            *(str(world[size]) for size in sizes),
+            str(len(world.get("queens", "Q"))),
+            f"`{world['sha256'][:16]}`",
+        )
         for world in model.places[:_MOST]
     ]
     of_worlds = ("Ranges", "Food items", "Rock", "Trail cells", "Listed ants", "Nests", "SHA-256")
     variables = ("Entity", "State variable", "Values", "Unit")
     parts = {
         "command": command,
-        "entities": _table(("Entity", "Number in a world"), model.entities()),
         "state_variables": _table(variables, model.state_variables()),
         "learning": model.learning(),
         "sensing": model.sensing(),
@@ -330,10 +317,6 @@ def _table(heads: Row, rows: Iterable[Row]) -> str:
     """Return a table as Markdown, "" without rows."""
     cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
     return Table("", heads, cells, text_columns=len(heads)).markdown().rstrip()
-
-
-def _nests(world: Mapping[str, Any]) -> int:
-    return len(world.get("queens", "Q"))
 
 
 def _list_of(value: Any) -> list[Any]:

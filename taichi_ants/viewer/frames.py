@@ -15,16 +15,8 @@ import numpy as np
 # Elements of `clock`, in order. `deliveries` and `returns` count this episode, `delivered` and
 # `ticks` all episodes. The level of a trail is its value in `trail` minus `trail_clock`, or 0.
 CLOCK = (
-    "episode",
-    "tick",
-    "deliveries",
-    "returns",
-    "epsilon",
-    "learning_rate",
-    "ants",
-    "delivered",
-    "ticks",
-    "trail_clock",  # then those of the fields in order
+    *("episode", "tick", "deliveries", "returns", "epsilon", "learning_rate"),
+    *("ants", "delivered", "ticks", "trail_clock"),  # then the clocks of the fields in order
 )
 
 # Elements of a point of the curves, in order. `ticks` and `delivered` count all episodes,
