@@ -19,6 +19,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from pathlib import Path
 
     import numpy as np
+    import off_policy
 
     from taichi_ants import (
         Colony,
@@ -54,10 +55,10 @@ SIZES = (1000, 3000, 10_000, 30_000, 100_000)
 # Off-policy evaluation: target policies explore a little; rewards after 100 steps hardly count.
 HORIZON, DISCOUNT, EPSILON = 100, 0.95, 0.1
 INTERVALS = {"resamples": 40, "level": 0.9}
-JUDGES: dict[str, Callable[..., offline.PolicyValues]] = {
+JUDGES: dict[str, Callable[..., off_policy.PolicyValues]] = {
     "importance sampling": lambda *given: _sampled(*given, weighted=False),
     "weighted": lambda *given: _sampled(*given, weighted=True),
-    "model": lambda *given: offline.model_based(*given, **INTERVALS),
+    "model": lambda *given: off_policy.model_based(*given, **INTERVALS),
 }
 
 # Colonies of 64 ants, three far piles; those with a lifespan have births.
@@ -167,11 +168,11 @@ def _returns(table: np.ndarray, episodes: int, seed: int, epsilon: float) -> np.
     return record(WORLD, table, episodes, seed, 600, STILL, epsilon).returns(DISCOUNT)
 
 
-def _sampled(*given: object, weighted: bool) -> offline.PolicyValues:
-    return offline.importance_sampling(*given, weighted=weighted, **INTERVALS)
+def _sampled(*given: object, weighted: bool) -> off_policy.PolicyValues:
+    return off_policy.importance_sampling(*given, weighted=weighted, **INTERVALS)
 
 
-def _scores(found: offline.PolicyValues, true: np.ndarray) -> tuple[float, ...]:
+def _scores(found: off_policy.PolicyValues, true: np.ndarray) -> tuple[float, ...]:
     """Return Spearman's correlation, loss, coverage of intervals, and effective sample size."""
     from scipy.stats import rankdata
 
