@@ -199,7 +199,6 @@ MUTATIONS = [
     ("engines/runs/step.py", "enters & ant.carries", "moves & ant.carries", BATCHED),
     ("task/rules/vision.py", "(state >> 1) & 21", "(state >> 1) & 5", BATCHED),
     ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", LONE_NOISE),
-    ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
     ("engines/runs/kernels.py", "= paper_state, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
     ("features/life.py", "a.age >= lifespan", "a.age > lifespan", COLONY),

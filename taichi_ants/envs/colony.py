@@ -12,7 +12,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from taichi_ants.arguments import checked_task
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.rollout import Rollout, TablePolicy
 from taichi_ants.envs.vector import (
     ACTION_MASKS,
     Ants,
@@ -72,8 +71,6 @@ class ColonyWorlds(Ants):
         self.events = np.full(shape, Event.NONE, np.int64)
         self.deliveries = np.zeros(shape, np.int64)
         self._last: dict[str, np.ndarray] = {}  # at the end of episodes, in mode SAME_STEP
-        # Events and states of the last step, before worlds have begun again.
-        self._results = np.zeros(0, np.uint8), np.zeros(0, np.int32)
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
         new = np.array([seed is not None for seed in seeds]) & which
@@ -113,7 +110,6 @@ class ColonyWorlds(Ants):
             terminated = np.zeros_like(terminated)
         if self.mode is AutoresetMode.SAME_STEP and (over.any() or terminated.any()):
             self._last = self.facts()
-        self._results = self.events.astype(np.uint8).reshape(-1), self.states().copy()
         begins = over
         if self.mode is not AutoresetMode.SAME_STEP:
             begins = waiting & (self.mode is AutoresetMode.NEXT_STEP)
@@ -121,23 +117,6 @@ class ColonyWorlds(Ants):
             self.begin(begins, [None] * len(begins))
         truncated = np.repeat(over, self.colony.capacity)
         return self.rewards.reshape(-1), terminated.reshape(-1), truncated
-
-    def play(
-        self, into: Rollout, finals: np.ndarray, waiting: np.ndarray, choices: TablePolicy | None
-    ) -> None:
-        masks = choices.masks() if choices is not None else None
-        for t, actions in enumerate(into.actions):
-            if choices is not None and masks is not None:
-                actions[:] = choices.draw(masks.take(self.states()))
-            rewards, terminated, truncated = self.advance(actions, waiting)
-            into.rewards[t], into.terminated[t], into.truncated[t] = rewards, terminated, truncated
-            into.events[t], finals[t] = self._results
-            ended = truncated.reshape(self.acted.shape)[:, 0]
-            waiting = ended | (waiting & (self.mode is AutoresetMode.DISABLED))
-            into.observations[t + 1] = self.shown.show(self.states())
-
-    def states(self) -> np.ndarray:
-        return self.colony.states.reshape(-1)
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
         if last:
