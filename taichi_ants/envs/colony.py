@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from taichi_ants.arguments import checked_task
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.vector import (
@@ -20,7 +18,6 @@ from taichi_ants.envs.vector import (
     Rules,
     Step,
     Worlds,
-    task_of,
 )
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features.support import BASE, CASTES, CHOICE
@@ -30,7 +27,6 @@ from taichi_ants.task.events import Event
 # The default length of a colony's episode, in ticks.
 MAX_STEPS = 1000
 SUPPORTS = BASE - CHOICE - CASTES - {"choice.rule=softmax"}  # actions are given
-METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 
 class ColonyWorlds(Ants):
@@ -47,18 +43,16 @@ class ColonyWorlds(Ants):
     def __init__(
         self,
         n_worlds: int,
-        task: Rules | None,
         arguments: Arguments,
         ants: int,
         start: str,
         capacity: int | None = None,
         supports: Collection[str] = SUPPORTS,
     ) -> None:
-        task = checked_task(task_of(task), "this environment", supports)
-        super().__init__(n_worlds, task, arguments, supports, METADATA["render_modes"])
+        super().__init__(n_worlds, arguments, "this environment", supports, "leave it out")
         self.colony = Colony(
             [self.worlds[w % len(self.worlds)] for w in range(n_worlds)],
-            replace(task, evaporation_in_evaluation=task.evaporation_in_training),
+            replace(self.task, evaporation_in_evaluation=self.task.evaporation_in_training),
             training=None,
             seeds=range(n_worlds),
             ants=ants,
@@ -189,8 +183,6 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
     - All others: See `HexForageVectorEnv`; `render` draws each ant's world.
     """
 
-    metadata = METADATA
-
     def __init__(
         self,
         num_envs: int = 64,
@@ -209,10 +201,11 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
             raise AntsError(
                 f"num_envs is {num_envs}; it counts ants, so it must be a multiple of ants, {ants}."
             )
-        arguments = Arguments(world, max_steps, observation_format, render_mode, max_episode_steps)
+        form = observation_format, render_mode, max_episode_steps
+        arguments = Arguments(world, task, max_steps, *form)
         # The number of ants is fixed.
         supports = SUPPORTS - {"life.births", "life.lifespan"}
-        worlds = ColonyWorlds(n // ants, task, arguments, ants, start, supports=supports)
+        worlds = ColonyWorlds(n // ants, arguments, ants, start, supports=supports)
         super().__init__(worlds, n // ants, n, autoreset_mode, render_mode)
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
         if worlds.task.delivery == "terminates" and not same_step:

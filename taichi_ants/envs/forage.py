@@ -11,13 +11,14 @@ from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.spaces import Discrete
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from taichi_ants.arguments import checked_share, checked_task
+from taichi_ants.arguments import checked_share
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.rollout import Rollout, checked_plan
 from taichi_ants.envs.vector import (
     ACTION_MASKS,
+    METADATA,
     Ants,
     AntVectorEnv,
     Arguments,
@@ -26,7 +27,6 @@ from taichi_ants.envs.vector import (
     Rules,
     Step,
     Worlds,
-    task_of,
 )
 from taichi_ants.errors import as_array, check_one_of, checked_whole, expect, shown, whole
 from taichi_ants.features.support import CHOICE, LONE
@@ -36,7 +36,6 @@ from taichi_ants.task.constants import EPISODE_STEPS, N_ACTIONS
 
 SUPPORTS = LONE - CHOICE - {"choice.rule=softmax"}  # actions are given
 DELIVERIES = ("terminates", "truncates", "continues")
-METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
 # The command to an ant after the last step of an episode.
@@ -52,13 +51,10 @@ _PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64
 class LoneAnts(Ants):
     """Many ants, each alone in its world; a single launch steps all of them."""
 
-    def __init__(
-        self, n: int, task: Rules | None, delivery: str | None, arguments: Arguments
-    ) -> None:
-        task = checked_task(
-            task_of(task), "an environment of one ant", SUPPORTS, "leave it out, or use a Colony"
-        )
-        super().__init__(n, task, arguments, SUPPORTS, METADATA["render_modes"])
+    def __init__(self, n: int, delivery: str | None, arguments: Arguments) -> None:
+        what, instead = "an environment of one ant", "leave it out, or use a Colony"
+        super().__init__(n, arguments, what, SUPPORTS, instead)
+        task = self.task
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
         most = _MOST_CELLS // self.worlds[0].grid.size
@@ -157,8 +153,8 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
     ) -> None:
-        arguments = Arguments(world, max_steps, observation_format, render_mode)
-        self._ants = LoneAnts(1, task, delivery, arguments)
+        arguments = Arguments(world, task, max_steps, observation_format, render_mode)
+        self._ants = LoneAnts(1, delivery, arguments)
         self._arrays, self.render_mode = self._ants.batched.arrays, render_mode
         self.observation_space, self.action_space = self._ants.shown.space, Discrete(N_ACTIONS)
 
@@ -234,7 +230,6 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
     - All others: See `HexForageEnv`; `render` draws all worlds.
     """
 
-    metadata = METADATA
     _ants: LoneAnts
 
     def __init__(
@@ -250,8 +245,8 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         max_episode_steps: int | None = None,
     ) -> None:
         n = checked_whole("num_envs", num_envs)
-        arguments = Arguments(world, max_steps, observation_format, render_mode, max_episode_steps)
-        ants = LoneAnts(n, task, delivery, arguments)
+        form = observation_format, render_mode, max_episode_steps
+        ants = LoneAnts(n, delivery, Arguments(world, task, max_steps, *form))
         super().__init__(ants, n, n, autoreset_mode, render_mode)
 
     def rollout(

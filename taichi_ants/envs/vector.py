@@ -15,7 +15,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from taichi_ants.arguments import check_ranges, checked_max_steps, checked_world
+from taichi_ants.arguments import check_ranges, checked_max_steps, checked_task, checked_world
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.envs.rollout import checked_actions
 from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole, shown
@@ -44,10 +44,14 @@ def _action_masks() -> np.ndarray:
 ACTION_MASKS = _action_masks()  # the actions that can succeed, by the paper's state: int8 (128, 5)
 
 
+METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+
 class Arguments(NamedTuple):
     """The arguments that all environments have, see `HexForageEnv`."""
 
     world: Worlds
+    task: Rules | None
     max_steps: int
     observation_format: ObservationFormat
     render_mode: str | None
@@ -70,14 +74,19 @@ class Ants(ABC):
     def __init__(
         self,
         n_worlds: int,
-        task: Task,
         arguments: Arguments,
+        what: str,
         supports: Collection[str],
-        render_modes: Sequence[str],
+        instead: str,
     ) -> None:
-        self.task, self.worlds = task, _worlds_of(arguments.world, n_worlds, supports)
+        task = arguments.task
+        if isinstance(task, str):
+            check_one_of("task", task, tuple(Task.named()))
+            task = Task.named()[task]
+        self.task = task = checked_task(task, what, supports, instead)
+        self.worlds = _worlds_of(arguments.world, n_worlds, supports)
         if arguments.render_mode is not None:
-            check_one_of("render_mode", arguments.render_mode, render_modes)
+            check_one_of("render_mode", arguments.render_mode, METADATA["render_modes"])
         self.max_steps = checked_max_steps(arguments.max_steps, task)
         if arguments.max_episode_steps is not None:
             limit = checked_whole("max_episode_steps", arguments.max_episode_steps)
@@ -134,14 +143,6 @@ def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World,
     return tuple(built)
 
 
-def task_of(task: Rules | None) -> Task:
-    """Return the task that is given as one or by its name, or the paper's."""
-    if isinstance(task, str):
-        check_one_of("task", task, tuple(Task.named()))
-        return Task.named()[task]
-    return Task() if task is None else task
-
-
 class OfAnts:
     """Base of environments, which know whether they were reset."""
 
@@ -165,6 +166,8 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
     info is an array with an entry for each environment. Its mask `_name`, bool (num_envs,), is True
     for environments that have this info.
     """
+
+    metadata = METADATA
 
     def __init__(
         self,
