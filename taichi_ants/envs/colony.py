@@ -194,15 +194,13 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         observation_format: ObservationFormat = "cells",
         autoreset_mode: str | AutoresetMode = AutoresetMode.SAME_STEP,
         render_mode: str | None = None,
-        max_episode_steps: int | None = None,
     ) -> None:
         n, ants = checked_whole("num_envs", num_envs), checked_whole("ants", ants)
         if n % ants:
             raise AntsError(
                 f"num_envs is {num_envs}; it counts ants, so it must be a multiple of ants, {ants}."
             )
-        form = observation_format, render_mode, max_episode_steps
-        arguments = Arguments(world, task, max_steps, *form)
+        arguments = Arguments(world, task, max_steps, observation_format, render_mode)
         # The number of ants is fixed.
         supports = SUPPORTS - {"life.births", "life.lifespan"}
         worlds = ColonyWorlds(n // ants, arguments, ants, start, supports=supports)

@@ -226,7 +226,6 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
     - `world`: See `HexForageEnv`; or a list of n worlds with the same ranges, of which environment
     i has entry i modulo n.
     - `autoreset_mode`: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
-    - `max_episode_steps`: The step limit of `gymnasium.make_vec`; the smaller limit counts.
     - All others: See `HexForageEnv`; `render` draws all worlds.
     """
 
@@ -242,11 +241,10 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | None = None,
     ) -> None:
         n = checked_whole("num_envs", num_envs)
-        form = observation_format, render_mode, max_episode_steps
-        ants = LoneAnts(n, delivery, Arguments(world, task, max_steps, *form))
+        arguments = Arguments(world, task, max_steps, observation_format, render_mode)
+        ants = LoneAnts(n, delivery, arguments)
         super().__init__(ants, n, n, autoreset_mode, render_mode)
 
     def rollout(

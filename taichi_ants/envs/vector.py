@@ -18,7 +18,7 @@ from gymnasium.vector.utils import batch_space
 from taichi_ants.arguments import check_ranges, checked_max_steps, checked_task, checked_world
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.envs.rollout import checked_actions
-from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole, shown
+from taichi_ants.errors import AntsError, as_array, check_one_of, shown
 from taichi_ants.task import Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, N_STATES, PICK_UP
 from taichi_ants.task.states import state_from_index
@@ -55,7 +55,6 @@ class Arguments(NamedTuple):
     max_steps: int
     observation_format: ObservationFormat
     render_mode: str | None
-    max_episode_steps: int | None = None
 
 
 class Ants(ABC):
@@ -88,9 +87,6 @@ class Ants(ABC):
         if arguments.render_mode is not None:
             check_one_of("render_mode", arguments.render_mode, METADATA["render_modes"])
         self.max_steps = checked_max_steps(arguments.max_steps, task)
-        if arguments.max_episode_steps is not None:
-            limit = checked_whole("max_episode_steps", arguments.max_episode_steps)
-            self.max_steps = min(self.max_steps, limit)
         self.shown = Shown(task.sees, arguments.observation_format)
         self._scene: Any = None  # of `draw`
 
@@ -152,11 +148,6 @@ class OfAnts:
     def _check_begun(self, what: str) -> None:
         if not self._begun:
             raise ResetNeeded(f"no episode has begun; call reset() before {what}.")
-
-    @property
-    def max_steps(self) -> int:
-        """The step limit of an episode."""
-        return self._ants.max_steps
 
 
 class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
