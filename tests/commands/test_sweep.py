@@ -182,7 +182,7 @@ WRONG = {
     "unknown": (
         "shaping =",
         "shapings =",
-        ["`task.rewards.shapings` is not a setting; choose shaping"],
+        ["`task.rewards.shapings` is not a setting; choose"],
     ),
     "unknown key of the file": ("seeds =", "seds =", ["'seds' is not a setting", "choose seeds"]),
     "other kind": ("rollouts", "ants", ["'ants' is not a setting of a sweep of kind 'runs'"]),

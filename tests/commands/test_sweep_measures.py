@@ -187,7 +187,7 @@ training.learning_rate = [0.1, 0.2]
         (
             "[vary]",
             "[task.fields.home]\n[vary]\ntask.fields.hom.level = [1]",
-            ["no table task.fields.hom; add"],
+            ["task.fields.hom; add"],
         ),
     ],
 )
