@@ -45,7 +45,7 @@ _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 DURING = ("evaluation", "training", "both")
 SERIES = "series_"  # begins the names of the series of measures in outcomes
 # Settings that only the points that use them name, so that the blocks of others stay valid.
-_LATER = ("policy", "measures", "measure_every", "evaluation_epsilon")
+_LATER = ("policy", "measures", "measure_every", "evaluation_epsilon", "protocol")
 
 Progress = Callable[[float], None]
 Outcome = dict[str, np.ndarray]  # arrays by name
@@ -108,14 +108,8 @@ class RunPoint:
     after: ClassVar[None] = None
 
     def __post_init__(self) -> None:
-        (config,) = arguments.checked_configs(self.training)
-        object.__setattr__(self, "training", config)
-        arguments.checked_task(self.task, *arguments.ALONE)
-        _check_policy(self.policy, self.episodes)
-        more = "" if self.policy else "; 0 requires a policy"
-        checked_whole("episodes", self.episodes, 0 if self.policy else 1, otherwise=more)
+        _check(self, bool(self.policy), *arguments.ALONE)
         arguments.checked_max_steps(self.max_steps, self.task)
-        checked_whole("rollouts", self.rollouts)
 
     @property
     def alike(self) -> tuple:
@@ -178,13 +172,19 @@ class FixedPolicy:
         return cls(name_or_path, hashlib.sha256(q_values.tobytes()).hexdigest(), q_values)
 
 
-def _check_policy(policy: FixedPolicy | None, episodes: int) -> None:
-    """Raise AntsError if there is a policy, but also training."""
-    if policy and episodes:
+def _check(point: Any, can_skip_training: bool, *supports: Any) -> None:
+    """Check what both kinds of points have, and complete the configuration of the learner."""
+    (config,) = arguments.checked_configs(point.training)
+    object.__setattr__(point, "training", config)
+    arguments.checked_task(point.task, *supports)
+    if point.policy and point.episodes:
         raise AntsError(
-            f"policy is {policy.name!r}, but episodes is {episodes}; a fixed policy does not "
-            "learn, so set episodes = 0."
+            f"policy is {point.policy.name!r}, but episodes is {point.episodes}; a fixed policy "
+            "does not learn, so set episodes = 0."
         )
+    more = "" if can_skip_training else "; 0 requires a policy"
+    checked_whole("episodes", point.episodes, int(not can_skip_training), otherwise=more)
+    checked_whole("rollouts", point.rollouts)
 
 
 @dataclass(frozen=True)
@@ -240,14 +240,12 @@ class ColonyPoint:
     kind: ClassVar[str] = "colony"
 
     def __post_init__(self) -> None:
-        (config,) = arguments.checked_configs(self.training)
-        object.__setattr__(self, "training", config)
-        arguments.checked_task(self.task, "a colony", COLONY)
+        rule = self.task.choice
+        can_skip_training = self.after or self.policy or not rule.needs_table
+        _check(self, bool(can_skip_training), "a colony", COLONY)
         arguments.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
         check_one_of("sharing", self.sharing, ("shared", "independent"))
-        arguments.check_learner(config, self.task, self.sharing)
-        _check_policy(self.policy, self.episodes)
-        rule = self.task.choice
+        arguments.check_learner(self.training, self.task, self.sharing)
         for name in ("episodes", "policy", "after", "evaluation_epsilon"):
             if not rule.needs_table and getattr(self, name) not in (None, 0):
                 raise AntsError(
@@ -256,12 +254,8 @@ class ColonyPoint:
                 )
         if self.evaluation_epsilon is not None:
             arguments.checked_share("evaluation_epsilon", self.evaluation_epsilon)
-        without_training = self.after or self.policy or not rule.needs_table
-        more = "" if without_training else "; 0 requires a policy"
-        checked_whole("episodes", self.episodes, 0 if without_training else 1, otherwise=more)
         Recorder(self.measures, self.measure_every)  # raises an error if it cannot read them
         checked_whole("ticks", self.ticks, most=MAX_STEPS)
-        checked_whole("rollouts", self.rollouts)
         object.__setattr__(self, "protocol", checked_protocol(self.protocol))
         check_one_of("during", self.during, DURING)
         self._check_protocol()
@@ -413,11 +407,12 @@ def key_of(point: Point, *more: str) -> str:
     if castes:  # whose policies are named by their files
         named = ((name, FixedPolicy.named(path, point.task)) for name, path in castes.items())
         facts["castes"] = {name: policy.sha256 for name, policy in named}
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:32]
+    text = json.dumps(facts, sort_keys=True, default=_identity)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def _changed(value: Any) -> Any:
-    """Return what identifies a value in JSON, without settings that have their defaults."""
+def _identity(value: Any) -> Any:
+    """Return what identifies an object that JSON does not have."""
     if isinstance(value, World):
         return _sum_of(value)
     if isinstance(value, Drawn):
@@ -426,25 +421,22 @@ def _changed(value: Any) -> Any:
         return value.sha256
     if isinstance(value, ProtocolEvent):
         return value.facts()
-    if isinstance(value, Mapping):  # in which the order of the names counts
-        return [[name, _changed(entry)] for name, entry in value.items()]
-    if hasattr(value, "__dataclass_fields__"):
-        pairs = ((getattr(value, each.name), each) for each in fields(value))
-        own = {each.name: setting for setting, each in pairs if setting != _default(each)}
-        if isinstance(value, TrainingConfig):
-            defaults = learners.get(value.learner).hyperparameters()
-            more = {n: v for n, v in value.hyperparameters if v != getattr(defaults, n, None)}
-            own["hyperparameters"] = sorted(more.items())
-        return {name: _changed(setting) for name, setting in own.items()}
-    if isinstance(value, (list, tuple)):
-        return [_changed(element) for element in value]
-    return value.item() if isinstance(value, np.generic) else value
+    return value.item() if isinstance(value, np.generic) else _changed(value)
 
 
-def _default(declared: Field[Any]) -> Any:
-    if declared.default_factory is MISSING:
-        return declared.default
-    return declared.default_factory()
+def _changed(value: Any) -> dict[str, Any]:
+    """Return the fields of a point or settings that do not have their defaults."""
+    own = {}
+    for each in fields(value):
+        is_value, setting = each.default_factory is MISSING, getattr(value, each.name)
+        if setting != (each.default if is_value else each.default_factory()):  # type: ignore[misc]
+            # The order of named settings counts.
+            own[each.name] = [*setting.items()] if isinstance(setting, Mapping) else setting
+    if isinstance(value, TrainingConfig):
+        defaults = learners.get(value.learner).hyperparameters()
+        more = {n: v for n, v in value.hyperparameters if v != getattr(defaults, n, None)}
+        own["hyperparameters"] = sorted(more.items())
+    return own
 
 
 @lru_cache(4096)
@@ -461,19 +453,14 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
     """
     points = tuple(dict.fromkeys(earlier for point in points for earlier in chain(point)))
     each = (map(w.of, seeds) if isinstance(w, Drawn) else w for w in _worlds_of(points))
-    columns = columns_of(points).items()
-    return {
-        "version": __version__,
-        "seeds": list(seeds),
-        "worlds": [
-            world_facts(worlds) if isinstance(worlds, World) else [*map(world_facts, worlds)]
-            for worlds in each
-        ],
-        **{
-            name: values[0] if all(v == values[0] for v in values) else values
-            for name, values in columns
-        },
-    }
+    facts = {"version": __version__, "seeds": list(seeds)}
+    facts["worlds"] = [
+        world_facts(worlds) if isinstance(worlds, World) else [*map(world_facts, worlds)]
+        for worlds in each
+    ]
+    for name, values in columns_of(points).items():
+        facts[name] = values[0] if all(value == values[0] for value in values) else values
+    return facts
 
 
 def _worlds_of(points: Sequence[Point]) -> list[Any]:
@@ -491,18 +478,16 @@ def columns_of(points: Sequence[Point]) -> dict[str, list[Any]]:
     }
     rows = []
     for point in points:
-        row = {field.name: getattr(point, field.name) for field in fields(point)}
-        for name in ("world", "pool", "after"):
-            row |= {name: numbers.get(row[name])} if row.get(name) else {}
-        protocol, during = row.pop("protocol", ()), row.pop("during", "")
-        if protocol:
-            row |= {"protocol": [event.facts() for event in protocol], "during": during}
-        row = {k: v for k, v in row.items() if k not in _LATER or v not in (None, ())}
+        row = {k: v for k, v in vars(point).items() if k not in _LATER or v not in (None, ())}
+        row |= {k: numbers.get(row[k]) for k in ("world", "pool", "after") if row.get(k)}
+        row |= {"task": point.task.as_dict(), "training": point.training.as_dict()}
         if policy := row.get("policy"):
             row["policy"] = {"name": policy.name, "sha256": policy.sha256}
-        rows.append(
-            flat({**row, "task": point.task.as_dict(), "training": point.training.as_dict()})
-        )
+        if protocol := row.get("protocol"):
+            row["protocol"] = [event.facts() for event in protocol]
+        else:
+            row.pop("during", None)
+        rows.append(flat(row))
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: [row.get(name) for row in rows] for name in names}
 
