@@ -299,7 +299,7 @@ MUTATIONS = [
     ("studies/study.py", "chain(point)[0]", "chain(point)[-1]", STUDIES),
     ("studies/study.py", "needed & first.missing(store)", "needed & False", STUDIES),
     ("studies/study.py", "len(failed) == _HOPELESS and", "False and", EXECUTORS),
-    ("studies/points.py", " if setting != _default(each)}", "}", STUDIES),
+    ("studies/points.py", "if setting != (", "if True or (", STUDIES),
     ("studies/points.py", '"physics": PHYSICS, "kind"', '"kind"', STUDIES),
     ("studies/points.py", "= declared.checked(settings[declared.name])", "= 0.5", STUDIES),
     ("studies/executors.py", "if deaths[piece] < TRIES:", "if False:", EXECUTORS),

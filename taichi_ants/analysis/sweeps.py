@@ -172,7 +172,6 @@ def draw_design(
     """
     means, names = known_means(values), list(logarithmic)
     known = np.flatnonzero(np.isfinite(means))
-    means = means[known]
     rows = -(-len(names) // _COLUMNS)
     with style.styled():
         figure = style.new_figure(1.2 + 2.0 * rows)
@@ -180,24 +179,20 @@ def draw_design(
         for axes in panels.flat[len(names) :]:
             axes.set_visible(False)
         for axes, name in zip(panels.flat, names, strict=False):
-            column, log = [settings[n][name] for n in known.tolist()], logarithmic[name]
-            x = np.array(column)
+            column = [settings[n][name] for n in known.tolist()]
             if are_numbers(column):
+                x, look = np.array(column), dict[str, Any](linewidth=1.2)
                 parts = np.array_split(np.argsort(x, kind="stable"), min(_PARTS, len(x)))
-                middles = [np.exp(np.log(x[p]).mean()) if log else x[p].mean() for p in parts]
-                ends = middles, [means[part].mean() for part in parts]
-                axes.plot(*ends, color=style.INK, linewidth=1.2)
-                if log:
-                    style.logarithmic(axes.xaxis, (1,))
             else:
                 choices, x = np.unique([*map(str, column)], return_inverse=True)
-                for n in range(len(choices)):
-                    mean = means[x == n].mean()
-                    axes.hlines(mean, n - 0.3, n + 0.3, color=style.INK, linewidth=1.2)
-                labels = [choice.replace("_", "\n") for choice in choices]
-                axes.set_xticks(range(len(choices)), labels, fontsize=8)
-                x = x + 0.5 * ((np.arange(len(x)) * 0.618) % 1 - 0.5)  # spreads the dots evenly
-            axes.scatter(x, means, s=6, color=style.SKY, alpha=0.6, linewidths=0)
+                parts = [np.flatnonzero(x == n) for n in range(len(choices))]
+                look = {"linestyle": "none", "marker": "_", "markersize": 16}
+                axes.set_xticks(range(len(choices)), [c.replace("_", "\n") for c in choices])
+            centres = np.array([(np.median(x[p]), means[known[p]].mean()) for p in parts])
+            axes.plot(*centres.T, color=style.INK, **look)
+            axes.scatter(x, means[known], s=6, color=style.SKY, alpha=0.6, linewidths=0)
+            if logarithmic[name]:
+                style.logarithmic(axes.xaxis, (1,))
             axes.set_xlabel(short(name, names))
         figure.supylabel(words)
         caption = (

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -114,9 +114,9 @@ class RunPoint:
     @property
     def alike(self) -> tuple:
         """The settings that all points of a block share."""
-        which = self.training.learner, self.training.planning_steps
+        learner = self.training.learner, self.training.planning_steps
         lengths = self.episodes, self.max_steps, self.rollouts
-        return (self.world, self.task, which, *lengths, self.policy)
+        return (self.world, self.task, learner, lengths, self.policy)
 
     @property
     def runs_of_a_block(self) -> int:
@@ -428,8 +428,8 @@ def _changed(value: Any) -> dict[str, Any]:
     """Return the fields of a point or settings that do not have their defaults."""
     own = {}
     for each in fields(value):
-        is_value, setting = each.default_factory is MISSING, getattr(value, each.name)
-        if setting != (each.default if is_value else each.default_factory()):  # type: ignore[misc]
+        make, setting = each.default_factory, getattr(value, each.name)
+        if setting != (each.default if make is MISSING else make()):
             # The order of named settings counts.
             own[each.name] = [*setting.items()] if isinstance(setting, Mapping) else setting
     if isinstance(value, TrainingConfig):
