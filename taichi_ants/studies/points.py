@@ -48,6 +48,9 @@ SERIES = "series_"  # begins the names of the series of measures in outcomes
 _LATER = ("policy", "measures", "measure_every", "evaluation_epsilon", "protocol")
 
 Progress = Callable[[float], None]
+Where = Mapping[str, Any]  # the arguments `threads` and `arch` of `train`
+Seeds = Sequence[int]
+Tables = np.ndarray | None  # of the point `after`, float32 (seeds, n_states, 5)
 Outcome = dict[str, np.ndarray]  # arrays by name
 
 
@@ -67,15 +70,11 @@ class Drawn:
                 settings[declared.name] = declared.checked(settings[declared.name])
         return cls(json.dumps([preset, first, settings, regions or {}], sort_keys=True))
 
+    @lru_cache(1024)  # noqa: B019 - all points of a study can share worlds
     def of(self, seed: int) -> World:
         """Return the world of a seed; AntsError if a setting is not allowed."""
-        return _drawn(self.recipe, seed)
-
-
-@lru_cache(1024)  # because all points of a study can share worlds
-def _drawn(recipe: str, seed: int) -> World:
-    preset, first, settings, regions = json.loads(recipe)
-    return worlds.build(preset, first + seed, **settings).with_regions(regions)
+        preset, first, settings, regions = json.loads(self.recipe)
+        return worlds.build(preset, first + seed, **settings).with_regions(regions)
 
 
 @dataclass(frozen=True)
@@ -84,15 +83,13 @@ class RunPoint:
 
     Outcome: `returns`, `steps` and `deliveries` of training, integer (seeds, episodes);
     `greedy_returns`, `greedy_steps` and `greedy_deliveries` of the rollouts, integer (seeds,
-    rollouts). With training also `q_values`, float32 (seeds, n_states, 5).
+    rollouts). With training also `q_values`, float32 (seeds, n_states, 5). Raises AntsError if a
+    value is not allowed.
 
     Attributes:
         episodes: The number of training episodes; 0 with a policy.
         max_steps: The step limit of episodes and rollouts.
         policy: The policy that the ant follows if there is no training.
-
-    Raises:
-        AntsError: A value is not allowed.
     """
 
     world: World
@@ -130,31 +127,25 @@ class RunPoint:
 
     @staticmethod
     def compute(
-        points: Sequence[RunPoint],
-        seeds: Sequence[int],
-        learned: np.ndarray | None,
-        progress: Progress,
-        where: Mapping[str, Any],
+        points: Sequence[RunPoint], seeds: Seeds, learned: Tables, progress: Progress, where: Where
     ) -> Outcome:
         """Return the outcomes of points of one block: arrays (points, seeds, ...)."""
         from taichi_ants.engines.runs.training import evaluate, train
 
-        first, configs = points[0], [point.training for point in points]
+        first, configs, shape = points[0], [p.training for p in points], (len(points), len(seeds))
         world, lengths, task = first.world, (first.episodes, first.max_steps), first.task
-        shape = len(points), len(seeds)
         if first.policy:
-            q_values = np.broadcast_to(
-                first.policy.q_values, (*shape, *first.policy.q_values.shape)
-            )
+            table = first.policy.q_values
+            q_values = np.broadcast_to(table, (*shape, *table.shape))
             outcome = {name: np.zeros((*shape, 0), np.int32) for name in _RUN_ARRAYS}
         else:
             trained = train(world, configs, seeds, *lengths, task, **where, progress=progress)
-            q_values = trained.q_values
             outcome = {name: files.small(getattr(trained, name)) for name in _RUN_ARRAYS}
-            outcome["q_values"] = q_values
+            outcome["q_values"] = q_values = trained.q_values
         greedy = evaluate(world, q_values, first.rollouts, seeds, first.max_steps, task, **where)
-        of_rollouts = {f"greedy_{name}": getattr(greedy, name) for name in _RUN_ARRAYS}
-        return outcome | {name: files.small(array) for name, array in of_rollouts.items()}
+        for name in _RUN_ARRAYS:
+            outcome[f"greedy_{name}"] = files.small(getattr(greedy, name))
+        return outcome
 
 
 @dataclass(frozen=True)
@@ -194,7 +185,7 @@ class ColonyPoint:
     Outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
     integer (seeds, rollouts), as in `ColonyEpisodes`; `q_values`, float32 (seeds, n_states, 5), if
     ants learned into a shared table. `series_NAME`, float64 (seeds, rollouts, rows), of each
-    measure NAME.
+    measure NAME. Raises AntsError if a value is not allowed.
 
     Attributes:
         world: The world, or the recipe of one for each seed, all of the same ranges.
@@ -214,9 +205,6 @@ class ColonyPoint:
             evaluation, without `Measure` objects.
         protocol: Events with interventions, see `taichi_ants.protocol`.
         during: When they happen: in each episode of the "evaluation", the "training", or "both".
-
-    Raises:
-        AntsError: A value is not allowed.
     """
 
     world: World | Drawn
@@ -267,13 +255,12 @@ class ColonyPoint:
         for learns in (True, False) if self.episodes else (False,):
             world = self.pool[0] if learns and self.pool else self.first_world
             for event in self.events(learns):
-                of_path = [other for other in self.protocol if other.path == event.path]
+                number = [e for e in self.protocol if e.path == event.path].index(event) + 1
                 try:
                     event.times(self.ticks)
                     for intervention in event.interventions:
                         intervention.check_in(world, self.task, learns)
                 except AntsError as error:
-                    number = of_path.index(event) + 1
                     raise AntsError(
                         f"in [[{event.path}]] number {number}, in the {DURING[learns]}, {error}"
                     ) from error
@@ -302,13 +289,10 @@ class ColonyPoint:
     @property
     def seconds(self) -> float:
         """The approximate time of a seed on one processor."""
-        cells = self.first_world.grid.size * sum(
-            _WORK_OF_DIFFUSION if field.diffusion else _WORK_OF_A_CELL
-            for field in (self.task.pheromone, *self.task.fields.values())
-            if field.dense
-        )
-        ticks = self.ticks * (self.episodes + self.rollouts)
-        return (self.ants + cells) * ticks / _TICKS_OF_A_SECOND
+        fields = [one for one in (self.task.pheromone, *self.task.fields.values()) if one.dense]
+        work = sum(_WORK_OF_DIFFUSION if one.diffusion else _WORK_OF_A_CELL for one in fields)
+        ants = self.ants + work * self.first_world.grid.size
+        return ants * self.ticks * (self.episodes + self.rollouts) / _TICKS_OF_A_SECOND
 
     def events(self, learns: bool) -> tuple[ProtocolEvent, ...]:
         """Return the events of episodes of training or, if not `learns`, of the evaluation."""
@@ -338,26 +322,20 @@ class ColonyPoint:
     @staticmethod
     def compute(
         points: Sequence[ColonyPoint],
-        seeds: Sequence[int],
-        learned: np.ndarray | None,
+        seeds: Seeds,
+        learned: Tables,
         progress: Progress,
-        where: Mapping[str, Any],
+        where: Where,
     ) -> Outcome:
-        """Return the outcome of the one point in `points`, arrays (1, seeds, ...).
-
-        `learned` has the tables of the point `after`, from which learning starts.
-        """
+        """Return the outcome of the one point in `points`, arrays (1, seeds, ...)."""
         (point,) = points
         share = point.episodes / (point.episodes + point.rollouts)
         tables = point.tables(seeds, learned, lambda done: progress(share * done), where)
         colony = point.colony(point.worlds(seeds), seeds, tables, False, **where)
+        how: dict[str, Any] = {"measures": point.measures, "every": point.measure_every}
+        how["protocol"] = point.events(learns=False)
         episodes = colony.run(
-            point.rollouts,
-            point.ticks,
-            lambda done: progress(share + (1 - share) * done),
-            measures=point.measures,
-            every=point.measure_every,
-            protocol=point.events(learns=False),
+            point.rollouts, point.ticks, lambda done: progress(share + (1 - share) * done), **how
         )
         outcome = {name: files.small(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
         if (series := episodes.series) is not None:
@@ -368,13 +346,8 @@ class ColonyPoint:
             outcome["q_values"] = tables
         return {name: array[None] for name, array in outcome.items()}
 
-    def tables(
-        self, seeds: Sequence[int], learned: Any, progress: Progress, where: Mapping[str, Any]
-    ) -> Any:
-        """Return the action values that ants follow in the evaluation; train them if necessary.
-
-        `learned` has the tables of the point `after`, from which learning starts.
-        """
+    def tables(self, seeds: Seeds, learned: Tables, progress: Progress, where: Where) -> Any:
+        """Return the action values that ants follow in the evaluation; train them if necessary."""
         if not self.episodes:
             return self.policy.q_values if self.policy else learned
         worlds, protocol = None, self.events(learns=True)
