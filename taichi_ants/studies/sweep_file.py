@@ -8,14 +8,7 @@ from dataclasses import fields
 from typing import Any, NamedTuple
 
 from taichi_ants import arguments, interventions, measures, protocol, rules, worlds
-from taichi_ants.errors import (
-    AntsError,
-    check_one_of,
-    checked_flag,
-    checked_whole,
-    expect,
-    shown,
-)
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, refuse, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
 from taichi_ants.measures.measure import RUN
@@ -74,17 +67,13 @@ class Base(NamedTuple):
             raise AntsError(f"measures is missing; name one or more of {finished.names_of(kind)}.")
         for name in wanted:
             finished.of_runs(kind, name)
-        _check_once("measures", wanted)
         beside = [_BESIDE[name] for name in wanted if name in _BESIDE]
         wanted = list(dict.fromkeys([*wanted, *beside]))
-        events = [name for name in protocol.EVENTS if name in file]
-        for name in events:
-            if not isinstance(file[name], list):
-                raise AntsError(f"[{name}] is one table; write [[{name}]] in double brackets.")
-            if kind != "colony":
-                raise AntsError(f"[[{name}]] is for kind 'colony'; leave it out.")
-        numbers = [*map(str, range(1, 10**6))]
-        tables = file | {name: dict(zip(numbers, file[name], strict=False)) for name in events}
+        tables = dict(file)
+        for name in protocol.EVENTS.keys() & file.keys():
+            if not isinstance(file[name], list) or kind != "colony":
+                raise AntsError(f"[{name}] must be [[{name}]], in a file of kind 'colony'.")
+            tables[name] = {str(n): event for n, event in enumerate(file[name], start=1)}
         fixed = flat({name: table for name, table in tables.items() if name not in _OF_FILE})
         seeds = file.get("seeds", 10)
         if not isinstance(seeds, list):
@@ -172,8 +161,7 @@ class Base(NamedTuple):
         if key not in built:
             built[key] = _world(self.kind, world)
         if events:
-            of_kinds = ((kind, sorted(tables, key=int)) for kind, tables in events.items())
-            lists = {kind: [events[kind][n] for n in numbers] for kind, numbers in of_kinds}
+            lists = {name: [of[n] for n in sorted(of, key=int)] for name, of in events.items()}
             tree["protocol"] = protocol.read(lists)
         for setting in declared(TrainingConfig)[:5]:  # the others have defaults
             if setting.name not in training:
@@ -185,9 +173,7 @@ class Base(NamedTuple):
             is_last = name.endswith("_last50")
             least = finished.WINDOW if is_last else finished.of_runs(self.kind, name).episodes
             if point.episodes < least:
-                raise AntsError(
-                    f"{name} needs {least} episodes; use more or choose another measure."
-                )
+                raise AntsError(f"{name} needs {least} episodes; use more or another measure.")
         return point
 
 
@@ -224,23 +210,21 @@ def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:
 
     Also None for the short form of an intervention.
     """
-    event, path = re.fullmatch(rf"({'|'.join(protocol.EVENTS)})\.\d+\.(.*)", name), name
-    if event and not event[2].startswith("task."):
-        group, _, last = event[2].rpartition(".")
+    event = re.fullmatch(rf"({'|'.join(protocol.EVENTS)})\.\d+\.(.*)", name)
+    path = event[2] if event else name
+    if event and not path.startswith("task."):
+        group, _, path = path.rpartition(".")
         of: Any = interventions.INTERVENTIONS.get(group, protocol.EVENTS[event[1]])
         known = [s._replace(path=s.name) for s in declared(of) if not s.is_group]
-        path = last
     else:
-        path = event[2] if event else name
         preset = fixed.get("world.preset", "paper")
         of_world = worlds.settings_of(preset) if preset in worlds.names() else ()
         known = [*all_of(Task), *declared(TrainingConfig), *of_world]
-        for group in named_groups(Task):
-            entry = path.removeprefix(f"{group.path}.").partition(".")[0]
+        for named in named_groups(Task):
+            entry = re.match(rf"{named.path}\.([^.]+)\.", path)
             # The parameters of rules that are not registered are unknown.
-            is_rule = group.path == "task.rules"
-            if path.startswith(f"{group.path}.") and (not is_rule or entry in rules.names()):
-                known += settings_of_entry(group, entry).values()
+            if entry and (named.path != "task.rules" or entry[1] in rules.names()):
+                known += settings_of_entry(named, entry[1]).values()
     return next((s._replace(path=name) for s in known if s.path == path), None)
 
 
@@ -257,16 +241,14 @@ def check_training(names: Iterable[str], points: Sequence[Point]) -> None:
 
 
 def _world(kind: str, settings: Settings) -> Any:
-    preset, drawn = settings.pop("preset", "paper"), "seed" in settings
-    first, per_seed = settings.pop("seed", 0), settings.pop("per_seed", False)
-    regions = settings.pop("regions", {})
-    if not isinstance(regions, Mapping):
-        raise AntsError(f"world.regions is {shown(regions)}; it must be a table of regions.")
-    if checked_flag("world.per_seed", per_seed) and kind == "runs":
-        raise AntsError('world.per_seed is true, but kind is "runs"; leave it out.')
-    if per_seed or drawn:
+    preset, first = settings.pop("preset", "paper"), settings.pop("seed", None)
+    per_seed, regions = settings.pop("per_seed", False), settings.pop("regions", {})
+    expect("world.regions", regions, Mapping)
+    if per_seed not in ((True, False) if kind == "colony" else (False,)):
+        refuse("world.per_seed", per_seed, "true or false for kind 'colony', else left out")
+    if per_seed or first is not None:
         worlds.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
-    if not per_seed:
-        return worlds.build(preset, first, **settings).with_regions(regions)
-    checked_whole("world.seed", first, -(2**62), 2**62)
-    return Drawn.by(preset, first, regions, **settings)
+    first = checked_whole("world.seed", first or 0, -(2**62), 2**62)
+    if per_seed:
+        return Drawn.by(preset, first, regions, **settings)
+    return worlds.build(preset, first, **settings).with_regions(regions)

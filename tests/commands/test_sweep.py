@@ -191,11 +191,14 @@ WRONG = {
     "twice": ("discount", "epsilon = 0.1\ndiscount", ["training.epsilon is in [vary]"]),
     "empty": ("[1, 0]", "[]", ["task.rewards.shaping cannot vary, or has no values"]),
     "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "or a list of seeds"]),
-    "per seed": ("[task]", "[world]\nper_seed = true\n[task]", ["per_seed is true", 'is "runs"']),
+    "per seed": (
+        "[task]",
+        "[world]\nper_seed = true\n[task]",
+        ["per_seed is True", "for kind 'colony'"],
+    ),
     "for colonies": ("[vary]", "[vary]\ntask.life.regrowth = [1]", ["use a Colony"]),
     "against": ("[task]", "[against]\ntask.rewards.shaping = 7\n[task]", ["against is", "[vary]"]),
     "margin alone": ("seeds =", "margin = 1\nseeds =", ["which margin requires"]),
-    "measure twice": ('"greedy_deliveries"', '"return_last50"', ["'return_last50' more than once"]),
     "value twice": ("[1, 0]", "[1, 1]", ["task.rewards.shaping has 1 more than once"]),
     "few episodes": ("episodes = 50", "episodes = 49", ["return_last50 needs 50 episodes"]),
     "seed of one world": ("[task]", "[world]\nseed = 1\n[task]", ["world.seed has no effect on"]),
@@ -355,9 +358,9 @@ WRONG_EVENTS = {
         "learning_rate",
         ["in [[at]] number 1, in the evaluation, the ants"],
     ),
-    "one table": ("[[every]]", "[every]", ["write [[every]] in double brackets"]),
+    "one table": ("[[every]]", "[every]", ["[every] must be [[every]]"]),
     "number": ("at.1.remove", "at.2.remove", ["the file has no table at.2; add it"]),
-    "kind": ('kind = "colony"', 'kind = "runs"', ["is for kind 'colony'"]),
+    "kind": ('kind = "colony"', 'kind = "runs"', ["in a file of kind 'colony'"]),
 }
 
 
