@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -28,15 +27,8 @@ from taichi_ants.studies.folder import Results
 from taichi_ants.studies.points import SERIES
 from taichi_ants.studies.store import Arrays, parts_of
 from taichi_ants.studies.study import Study
-from taichi_ants.studies.sweep_file import (
-    Base,
-    Settings,
-    as_list,
-    check_training,
-)
+from taichi_ants.studies.sweep_file import Base, Settings, as_list, check_training
 
-FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
-SERIES_FILE, SENSITIVITY = "series.csv", "sensitivity.csv"
 _SHOWN_POINTS = 10  # of a design, in the report
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
@@ -58,8 +50,8 @@ class Sweep:
     base: Base
     study: Study
     order: list[int]
-    settings: tuple[Settings, ...]
-    grids: tuple[tuple[slice, Mapping[str, Axis]], ...]
+    settings: list[Settings]
+    grids: Sequence[tuple[slice, Mapping[str, Axis]]]
     design: Design
     against: tuple[str, Any] | None
     margin: float
@@ -80,7 +72,7 @@ class Sweep:
             return {}
         (name, value), findings = self.against, {}
         for grid, _ in self.grids:
-            rows, of_grid = list(self.settings[grid]), values[grid]
+            rows, of_grid = self.settings[grid], values[grid]
             pairs = {
                 n: rows.index({**row, name: value})
                 for n, row in enumerate(rows)
@@ -120,19 +112,21 @@ def sweep_of(file: Settings) -> Sweep:
     """Return the sweep of the contents of a file; AntsError if a setting is not allowed."""
     base = Base.of(file)
     drawn = Design(**{key.name: file[key.name] for key in declared(Design) if key.name in file})
-    axes = tuple(map(base.axes, as_list(file.get("vary", []))))
-    if not axes:
+    rows, grids = list[Settings](), []
+    for table in as_list(file.get("vary", [])):
+        axes = base.axes(table)
+        part = drawn.rows(axes)
+        grids.append((slice(len(rows), len(rows) + len(part)), axes))
+        rows += part
+    if not grids:
         raise AntsError("[vary] is missing; add it with lists of values of the settings that vary.")
-    if drawn.sensitivity and len(axes) > 1:
-        raise AntsError(f"sensitivity is for one [vary] table, but there are {len(axes)}.")
-    parts = [drawn.rows(of_table) for of_table in axes]
-    rows, built = tuple(itertools.chain(*parts)), dict[str, Any]()
+    if drawn.sensitivity and len(grids) > 1:
+        raise AntsError(f"sensitivity is for one [vary] table, but there are {len(grids)}.")
+    built = dict[str, Any]()
     points = tuple(base.point(row, built) for row in rows)
-    ends = list(itertools.accumulate(map(len, parts), initial=0))
-    grids = tuple(zip(map(slice, ends, ends[1:]), axes, strict=True))
     check_training(base.fixed, points)
-    for part, names in grids:
-        check_training(names, points[part])
+    for of_table, names in grids:
+        check_training(names, points[of_table])
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
@@ -188,7 +182,7 @@ def tables(sweep: Sweep, results: Results) -> str:
     runs = {name: column[p] for name, column in tables_of.table_of(settings).items()}
     runs["seed"] = tables_of.column(sweep.study.seeds)[s]
     runs |= {name: array[p, s].astype(float) for name, array in values.items()}
-    tables_of.write(folder / RUNS, runs, results.parquet)
+    tables_of.write(folder / "runs.csv", runs, results.parquet)
     gaps = [name for name, array in values.items() if np.isnan(array).any()]
     with_iqm = [name for name in values if finished.of_runs(sweep.base.kind, name).uses_iqm]
     centres = sweeps.centres_of(values, with_iqm)
@@ -196,9 +190,9 @@ def tables(sweep: Sweep, results: Results) -> str:
         {**row, "seeds": int(seeds), **sweeps.centre_columns(centre, gaps)}
         for row, seeds, centre in zip(settings, present.sum(axis=1), centres, strict=True)
     ]
-    tables_of.write(folder / SUMMARY, tables_of.table_of(rows), results.parquet)
+    tables_of.write(folder / "summary.csv", tables_of.table_of(rows), results.parquet)
     if "measure_every" in sweep.base.reading:
-        tables_of.write(folder / SERIES_FILE, _series(sweep, results), results.parquet)
+        tables_of.write(folder / "series.csv", _series(sweep, results), results.parquet)
     if results.part:
         return sweeps.report(settings, values)
 
@@ -207,7 +201,7 @@ def tables(sweep: Sweep, results: Results) -> str:
     if sweep.against:
         more = ["finding", "difference", "low", "high", *["left_out"] * (first in gaps)]
         columns = [*sweeps.columns_of(sweep.settings), *more]
-        files.write_csv(folder / FINDINGS, findings.values(), columns)
+        files.write_csv(folder / "findings.csv", findings.values(), columns)
     if sweep.design.is_grid:
         notes = [findings.get(n, {}).get("finding", "") for n in range(len(sweep.settings))]
         report = sweeps.report(sweep.settings, values, sweep.against, notes)
@@ -220,10 +214,9 @@ def tables(sweep: Sweep, results: Results) -> str:
         report = f"{report}\n{design.report(indices, seeds)}"
         columns = [name for name in COLUMNS if gaps or name != "left_out"]
         shown_of = ({name: row[name] for name in columns} for row in indices)
-        files.write_csv(folder / SENSITIVITY, shown_of, columns)
+        files.write_csv(folder / "sensitivity.csv", shown_of, columns)
     if results.figures:
-        files.check_writable_folder(folder / FIGURES)
-        _draw(sweep, first, values[first], folder / FIGURES)
+        _draw(sweep, first, values[first], files.check_writable_folder(folder / "figures"))
     return report
 
 
