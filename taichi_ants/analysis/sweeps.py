@@ -156,52 +156,47 @@ def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
 
 
 def draw_design(
-    path: Path,
-    settings: Sequence[Settings],
-    logarithmic: Mapping[str, bool],
-    values: np.ndarray,
-    words: str,
+    path: Path, settings: Sequence[Settings], names: Sequence[str], values: np.ndarray, words: str
 ) -> None:
-    """Draw a measure against each setting that varies, a panel per setting and a dot per point.
+    """Draw a measure against each of some settings, a panel for each.
 
-    `settings` are those of P points, `logarithmic` whether a setting to show has such an axis,
-    `values` the measure, float64 (P, S), of S seeds, and `words` its name.
+    `settings` are those of P points, `values` the measure, float64 (P, S), of S seeds, and `words`
+    its name. A panel has means over an eighth of the points, or over those with the same choice.
 
     Raises:
         AntsError: The file (.png) cannot be written.
     """
-    means, names = known_means(values), list(logarithmic)
-    known = np.flatnonzero(np.isfinite(means))
-    rows = -(-len(names) // _COLUMNS)
+    means, rows = known_means(values), -(-len(names) // _COLUMNS)
+    lines = {name: {words: _parts_of([row[name] for row in settings], means)} for name in names}
     with style.styled():
         figure = style.new_figure(1.2 + 2.0 * rows)
         panels = figure.subplots(rows, min(_COLUMNS, len(names)), sharey=True, squeeze=False)
         for axes in panels.flat[len(names) :]:
             axes.set_visible(False)
         for axes, name in zip(panels.flat, names, strict=False):
-            column = [settings[n][name] for n in known.tolist()]
-            if are_numbers(column):
-                x, look = np.array(column), dict[str, Any](linewidth=1.2)
-                parts = np.array_split(np.argsort(x, kind="stable"), min(_PARTS, len(x)))
-            else:
-                choices, x = np.unique([*map(str, column)], return_inverse=True)
-                parts = [np.flatnonzero(x == n) for n in range(len(choices))]
-                look = {"linestyle": "none", "marker": "_", "markersize": 16}
-                axes.set_xticks(range(len(choices)), [c.replace("_", "\n") for c in choices])
-            centres = np.array([(np.median(x[p]), means[known[p]].mean()) for p in parts])
-            axes.plot(*centres.T, color=style.INK, **look)
-            axes.scatter(x, means[known], s=6, color=style.SKY, alpha=0.6, linewidths=0)
-            if logarithmic[name]:
-                style.logarithmic(axes.xaxis, (1,))
+            draw_lines(axes, lines[name], [*lines.values()])
+            if axes.get_xscale() == "log":
+                style.logarithmic(axes.xaxis, (1,))  # instead of a tick for each mean
             axes.set_xlabel(short(name, names))
         figure.supylabel(words)
         caption = (
-            f"A dot is the mean of a point of the design over {count(values.shape[1], 'seed')}. "
-            "Lines: means over an eighth of the points, or over those with the same choice."
+            "Means over an eighth of the points, or over those with the same choice, with 95 % "
         )
-        title = f"{sentence(words)} against each setting"
-        style.frame(figure, title, f"{caption}{gaps_in_words(values)}", {})
+        caption += f"intervals. A point is the mean of {count(values.shape[1], 'seed')}."
+        style.frame(figure, f"{sentence(words)} against each setting", caption, {})
     style.save(figure, path)
+
+
+def _parts_of(column: Sequence[Any], means: np.ndarray) -> list[tuple[Any, ...]]:
+    """Return for `draw_lines` the means over parts of the points, by their values in a column."""
+    choices, part = np.unique(column, return_inverse=True)
+    if is_range := are_numbers(column) and len(choices) > _PARTS:
+        part = np.argsort(np.argsort(column, kind="stable")) * _PARTS // len(column)
+    points = []
+    for n in range(part.max() + 1):
+        middle = np.median(np.array(column)[part == n]) if is_range else choices[n].item()
+        points.append((middle, *estimates(means[None, part == n], uses_iqm=False)[0][:3]))
+    return points
 
 
 def _far_apart(numbers: Sequence[float]) -> bool:

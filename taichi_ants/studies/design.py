@@ -26,9 +26,9 @@ from taichi_ants.errors import AntsError, imported, shown
 from taichi_ants.settings import Flag, Setting, Settings
 
 _DRAWN = ("design", "sobol")  # the condition of the other keys
-# Of the table of indices. The seed's share and the points left out are those of the measure.
+# Of the table of indices. The share of the seeds is that of the measure.
 COLUMNS = ("measure", "setting", "first_order", "first_order_low", "first_order_high",
-    "total", "total_low", "total_high", "seed_share", "left_out")  # fmt: skip
+    "total", "total_low", "total_high", "seed_share")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -132,9 +132,7 @@ class Design(Settings):
             return [dict(zip(axes, row, strict=True)) for row in itertools.product(*lists)]
         drawn = varying(axes)
         if not drawn:
-            raise AntsError(
-                f"[vary] has single values only; the design {self.design!r} needs more."
-            )
+            raise AntsError("[vary] has single values only; the design 'sobol' needs more.")
         rows = []
         for shares in self.shares(len(drawn)).tolist():
             share_of = dict(zip(drawn, shares, strict=True))
@@ -168,32 +166,26 @@ def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[dict
     """Return the indices of settings as rows with `COLUMNS`, with 95 % intervals from a bootstrap.
 
     `values` of the measure are float64 (points, seeds), for the points of Saltelli's scheme. Seeds
-    without a value (nan) do not count. Groups in which a point has no value are left out. The list
-    is empty if fewer than two remain, or all means over seeds are equal.
+    without a value (nan) do not count. The list is empty if a point has no value at all, or all
+    means over seeds are equal.
     """
     from SALib.analyze import sobol
 
-    means, step = known_means(values), len(names) + 2
-    kept = np.repeat(np.isfinite(means).reshape(-1, step).all(axis=1), step)
-    means, left_out = means[kept], int((~kept).sum())
-    if len(means) < 2 * step or all_equal(means[None])[0]:
+    means = known_means(values)
+    if np.isnan(means).any() or all_equal(means[None])[0]:
         return []
     how = {"calc_second_order": False, "num_resamples": 1000, "seed": RANDOM_SEED}
-    found, share = (
-        sobol.analyze(_problem(names), means, **how),
-        seed_share(values[kept], len(names)),
-    )
-    rows = []
+    found, share, rows = sobol.analyze(_problem(names), means, **how), seed_share(values, names), []
     for n, name in enumerate(names):
         ends = []
         for index in ("S1", "ST"):
             value, half = float(found[index][n]), float(found[f"{index}_conf"][n])
             ends += [value, value - half, value + half]
-        rows.append(dict(zip(COLUMNS, (measure, name, *ends, share, left_out), strict=True)))
+        rows.append(dict(zip(COLUMNS, (measure, name, *ends, share), strict=True)))
     return rows
 
 
-def seed_share(values: np.ndarray, n_settings: int) -> float:
+def seed_share(values: np.ndarray, names: Sequence[str]) -> float:
     """Return the share of the variance of means over seeds that the seeds make, 0 to 1.
 
     What seeds still change in these means looks like an interaction of all settings. The share is
@@ -201,7 +193,7 @@ def seed_share(values: np.ndarray, n_settings: int) -> float:
     What a seed adds to all points alike does not count, because all points have the same seeds.
     Points at which a seed has no value do not count. Nan for one seed.
     """
-    step, seeds = n_settings + 2, values.shape[1]
+    step, seeds = len(names) + 2, values.shape[1]
     drawn = np.concatenate([values[::step], values[step - 1 :: step]])
     drawn = drawn[~np.isnan(drawn).any(axis=1)]
     if seeds < 2 or len(drawn) < 2:
@@ -217,7 +209,7 @@ def report(rows: Sequence[Mapping[str, Any]], seeds: int) -> str:
     measures, names = ([*dict.fromkeys(row[k] for row in rows)] for k in COLUMNS[:2])
     lines = []
     for row in sorted(rows, key=lambda row: (measures.index(row["measure"]), -row["total"])):
-        measure, name, *numbers, share, _ = row.values()
+        measure, name, *numbers, share = row.values()
         groups = numbers[:3], numbers[3:]
         cells = [f"{number(n, 2)} {interval(low, high, 2)}" for n, low, high in groups]
         lines.append([measure, short(name, names), *cells, percent(share)])

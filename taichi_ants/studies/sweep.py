@@ -212,9 +212,7 @@ def tables(sweep: Sweep, results: Results) -> str:
         names = list(design.varying(axes))
         indices = [row for name in values for row in design.indices(name, names, values[name])]
         report = f"{report}\n{design.report(indices, seeds)}"
-        columns = [name for name in COLUMNS if gaps or name != "left_out"]
-        shown_of = ({name: row[name] for name in columns} for row in indices)
-        files.write_csv(folder / "sensitivity.csv", shown_of, columns)
+        files.write_csv(folder / "sensitivity.csv", indices, COLUMNS)
     if results.figures:
         _draw(sweep, first, values[first], files.check_writable_folder(folder / "figures"))
     return report
@@ -257,7 +255,5 @@ def _draw(sweep: Sweep, measure: str, values: np.ndarray, folder: Path) -> None:
         if sweep.design.is_grid:
             sweeps.draw(path, sweep.settings[grid], values[grid], label)
         else:
-            logs = {
-                name: getattr(axis, "log", False) for name, axis in design.varying(axes).items()
-            }
-            sweeps.draw_design(path, sweep.settings[grid], logs, values[grid], label)
+            names = list(design.varying(axes))
+            sweeps.draw_design(path, sweep.settings[grid], names, values[grid], label)

@@ -190,7 +190,6 @@ def test_indices_of_ishigami(ishigami):
         assert row["first_order_high"] - row["first_order_low"] < 0.25
     again = indices("y", NAMES, ishigami[:, None])  # the same bootstrap
     assert [[*row.values()][:8] for row in found] == [[*row.values()][:8] for row in again]
-    assert {row["left_out"] for row in found} == {0}
     text = report(found, 1).splitlines()
     assert [line.split()[1] for line in text[2:5]] == ["x1", "x2", "x3"]  # by their total index
     assert text[2].endswith(" -")  # the share of one seed is unknown
@@ -204,28 +203,17 @@ def test_the_share_of_seeds(ishigami, variance):
     noise = random.normal(0, np.sqrt(variance), (len(ishigami), seeds))
     values = ishigami[:, None] + noise + random.normal(0, 100, seeds)
     expected = variance / seeds / (ishigami.var() + variance / seeds)
-    assert seed_share(values, 3) == pytest.approx(expected, rel=0.1, abs=1e-9)
+    assert seed_share(values, NAMES) == pytest.approx(expected, rel=0.1, abs=1e-9)
     found = indices("y", NAMES, values)
-    assert found[0]["seed_share"] == seed_share(values, 3)
+    assert found[0]["seed_share"] == seed_share(values, NAMES)
     of_nothing = found[1]["total"] - TOTAL[1] * (1 - expected)  # x2 interacts with nothing
     assert of_nothing == pytest.approx(expected, abs=0.06)
 
 
-def test_groups_with_a_point_without_a_value_are_left_out(ishigami):
-    values = np.stack([ishigami, ishigami + 1], axis=1)
-    kept = np.delete(values, np.s_[5:10], axis=0)  # the second group of 3 + 2 points
-    values[7] = np.nan
-    found, wanted = indices("y", NAMES, values), indices("y", NAMES, kept)
-    assert [[*row.values()][:8] for row in found] == [[*row.values()][:8] for row in wanted]
-    assert {row["left_out"] for row in found} == {5}
-    values[7] = kept[2, 0], np.nan  # one of two seeds has a value
-    assert {row["left_out"] for row in indices("y", NAMES, values)} == {0}
-
-
 def test_constant_and_missing_values_have_no_indices(ishigami):
-    values = ishigami[:, None].copy()
-    values[7:-10:5] = np.nan  # leaves the first and the last two groups
-    assert indices("gaps", NAMES, values)[0]["left_out"] == len(values) - 3 * 5
-    values[7::5] = np.nan
+    values = np.stack([ishigami, ishigami + 1], axis=1)
+    values[7] = ishigami[7], np.nan  # one of two seeds has a value
+    assert len(indices("y", NAMES, values)) == 3
+    values[7] = np.nan
     assert indices("gaps", NAMES, values) == []
     assert indices("flat", NAMES, 0 * ishigami[:15, None]) == []
