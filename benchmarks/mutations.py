@@ -92,7 +92,7 @@ MUTATIONS = [
     ("rendering/rasteriser.py", "ANTS[snapshot.ant_nests]", "ANTS[0 * snapshot.ant_nests]", RASTER),
     (
         "viewer/recorder.py",
-        "self.colony.tables_of_ants[self.world, slots] *",
+        "self.colony.tables_of_ants[0, slots] *",
         "0 * slots *",
         RECORDING,
     ),
@@ -312,8 +312,8 @@ MUTATIONS = [
     # Recorder and viewer.
     ("viewer/recorder.py", "executed + 16 *", "executed + 8 *", RECORDING),
     ("viewer/recorder.py", "[order] + 8 * carrying", "[order] + 8 * ~carrying", RECORDING),
-    ("viewer/recorder.py", "*rates, *counts, clock)", "*rates, *counts, tick)", RECORDING),
-    ("viewer/recorder.py", "colony.delivered[self.world] + totals", "0 * totals", SESSION),
+    ("viewer/recorder.py", "*rates, *counts, *clocks)", "*rates, *counts, *[0] * 9)", RECORDING),
+    ("viewer/recorder.py", "colony.delivered[0] + totals", "0 * totals", SESSION),
     ("viewer/recorder.py", "        late._forget()\n", "", SESSION),
     ("viewer/recorder.py", "[new] = False", "[new] = True", RECORDING),
     (
