@@ -76,10 +76,8 @@ class FoodSources:
     def regrow(self, world: WorldState, delays: Sequence[int | None], tick: int) -> int:
         """Let food grow back where food sources have waited long enough, and their cell is empty.
 
-        `delays` are ticks, by kind of food; None means that the kind does not grow back.
-
-        Returns:
-            The number of loads that grew back.
+        `delays` are ticks, by kind of food; None means that the kind does not grow back. Returns
+        the number of loads that grew back.
         """
         regrown = 0
         for source in self.food_sources:
