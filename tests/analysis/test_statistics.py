@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from taichi_ants.analysis import statistics
 from taichi_ants.analysis.statistics import (
     _at_level,
     all_equal,
@@ -21,7 +20,6 @@ from taichi_ants.analysis.statistics import (
     interquartile_values,
     jackknife_values,
     known_means,
-    resampling_counts,
     student_interval,
     without_noise,
 )
@@ -196,15 +194,6 @@ def test_a_row_with_nan_stays_alone() -> None:
 
 
 @pytest.mark.parametrize("iqm", [False, True])
-def test_the_size_of_blocks_changes_nothing(iqm: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    values = np.random.default_rng(1).normal(size=(3, 60))
-    expected = bootstrap_interval(values, iqm=iqm)
-    resampling_counts.cache_clear()
-    monkeypatch.setattr(statistics, "_BLOCK_DRAWS", 1111)
-    np.testing.assert_array_equal(bootstrap_interval(values, iqm=iqm), expected)
-
-
-@pytest.mark.parametrize("iqm", [False, True])
 @given(values=SAMPLES)
 def test_the_interval_stays_within_the_seeds_and_around_the_middle(
     iqm: bool, values: np.ndarray
@@ -242,11 +231,6 @@ def test_quantiles_are_those_of_the_sorted_rows(shape: str, levels: tuple[float,
 def test_all_equal_by_hand() -> None:
     values = np.array([[2.0, 2.0], [2.0, 2.0 + 1e-12], [2.0, 2.1], [0.0, 0.0], [np.nan, 1.0]])
     assert all_equal(values).tolist() == [True, True, False, True, False]
-
-
-def test_jackknife_values_of_a_mean_are_the_values() -> None:
-    values = np.array([3.0, 5.0, 10.0])
-    np.testing.assert_allclose(jackknife_values(lambda means: 2 * means, values), 2 * values)
 
 
 def test_jackknife_values_remove_the_bias_of_noise() -> None:

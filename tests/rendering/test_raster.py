@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from taichi_ants import runtime
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.rendering import Scene, Snapshot, at_start, colours, rasteriser, text
+from taichi_ants.rendering import Scene, Snapshot, at_start, colours, text
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import Field, Food, Pheromone, Task
 from taichi_ants.worlds import World
@@ -164,11 +164,6 @@ def test_the_legend_shows_queens_ants_and_foods_in_their_colours(monkeypatch) ->
             for colour in several[:2]:
                 assert (frame == colours.channels(colour)).all(axis=2).any(), hex(colour)
         written.clear()
-
-
-def test_ants_that_are_dots_have_the_colour_of_their_food() -> None:
-    dots = rasteriser.ants([[5, 5]] * 3, 0, np.array([1, 1, 0]), 2.0, load=colours.FOODS[[0, 2, 2]])
-    assert dots[:, 6].tolist() == [0x9A3F00, colours.FOODS[2], colours.ANT]
 
 
 def test_fields_have_scales_of_their_own() -> None:
