@@ -15,7 +15,7 @@ from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import Scene, Snapshot, at_start, colours, text
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import Field, Food, Pheromone, Task
-from taichi_ants.worlds import World
+from taichi_ants.worlds import World, paper
 
 
 def index_at(rasteriser: Rasteriser, pixels: np.ndarray) -> np.ndarray:
@@ -251,27 +251,13 @@ def test_an_ant_points_where_it_is_heading(hexagon) -> None:
         assert np.linalg.norm(crumb - (crumb @ direction) * direction) < 0.15 * view.hexagon + 0.5
 
 
-def whole_scene() -> np.ndarray:
-    """A small world that has everything and no symmetry, without text."""
-    world = World(
-        ranges=(4, 6, 3),
-        queen=(0, 0, 0),
-        foods=[(3, 0, 0), (0, 5, 1)],
-        obstacles=[(0, 2, 0), (1, 2, 0), (0, 0, 2)],
-        trails=[((1, 0, 0), 250), ((2, 0, 0), 120), ((0, 3, 1), 25), ((0, 4, 1), 1)],
-        ants=[((1, 0, 0), 1), ((0, 3, 1), 4), ((3, 4, 0), 2)],
-    )
-    snapshot = dataclasses.replace(at_start(world, n=3), ant_carries=np.array([True, False, False]))
-    return Rasteriser(world.grid, 320, 200, margin=3).draw(snapshot)
-
-
 def test_the_number_of_threads_changes_nothing() -> None:
     before = runtime.start()
     try:
         pictures = []
         for threads in (1, 2):
             runtime.start(threads=threads)
-            pictures.append(whole_scene())
+            pictures.append(picture(paper(), (320, 200)))
         assert (pictures[0] == pictures[1]).all()
     finally:
         runtime.start(before.threads, before.arch)
