@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from taichi_ants import runtime
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.rendering import Scene, Snapshot, at_start, colours, text
+from taichi_ants.rendering import Scene, Snapshot, at_start, colours, picture, text
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import Field, Food, Pheromone, Task
 from taichi_ants.worlds import World, paper
