@@ -270,7 +270,6 @@ MUTATIONS = [
     ("analysis/statistics.py", "np.sqrt(n / (n - 1))", "np.sqrt((n - 1) / n)", STATISTICS),
     ("analysis/statistics.py", "cubes / (6 *", "cubes / (3 *", STATISTICS),
     ("analysis/statistics.py", "levels * (last + 2) - 1", "levels * last", STATISTICS),
-    ("analysis/statistics.py", "- (n - 1) * statistic", "- n * statistic", STATISTICS),
     ("analysis/findings.py", "max(1, len(readings))", "max(1, len(contrasts))", FINDINGS),
     ("analysis/findings.py", "< self.low or low > self.high", "< self.low", FINDINGS),
     (

@@ -16,7 +16,6 @@ the t interval is a point if the middle half consists of ties.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -194,21 +193,6 @@ def cautious_interval(
 def all_equal(values: np.ndarray) -> np.ndarray:
     """Return whether all seeds of a row agree up to rounding errors, bool (rows,)."""
     return np.ptp(values, axis=1) <= TIE_TOLERANCE * np.abs(values).max(axis=1)
-
-
-def jackknife_values(
-    statistic: Callable[[np.ndarray], np.ndarray], values: np.ndarray
-) -> np.ndarray:
-    """Return a pseudo-value for each seed, of a smooth function of means over seeds.
-
-    Their mean is the statistic, float (..., k) -> float (k,), without its bias of order 1/n, and
-    their spread is that of the statistic. With a single seed they are nan.
-    """
-    n = values.shape[-1]
-    if n < 2:
-        return np.full(n, np.nan)
-    total = values.sum(axis=-1, keepdims=True)
-    return n * statistic(total / n) - (n - 1) * statistic((total - values) / (n - 1))
 
 
 def _bca(values: np.ndarray, level: float, resamples: int) -> np.ndarray:

@@ -18,7 +18,6 @@ from taichi_ants.analysis.statistics import (
     estimates,
     interquartile_mean,
     interquartile_values,
-    jackknife_values,
     known_means,
     student_interval,
     without_noise,
@@ -231,33 +230,6 @@ def test_quantiles_are_those_of_the_sorted_rows(shape: str, levels: tuple[float,
 def test_all_equal_by_hand() -> None:
     values = np.array([[2.0, 2.0], [2.0, 2.0 + 1e-12], [2.0, 2.1], [0.0, 0.0], [np.nan, 1.0]])
     assert all_equal(values).tolist() == [True, True, False, True, False]
-
-
-def test_jackknife_values_remove_the_bias_of_noise() -> None:
-    """Effects of 8 configurations that do not differ have no spread; single seeds seem to."""
-    random = np.random.default_rng(3)
-    plain, single, corrected = [], [], []
-    for _ in range(300):
-        noise = random.normal(5, 1, size=(8, 40))
-        plain.append(variance(noise.mean(axis=1)))
-        single.append(variance(noise).mean())
-        corrected.append(jackknife_values(variance, noise).mean())
-    assert np.mean(single) == pytest.approx(1.0, abs=0.02)
-    assert np.mean(plain) == pytest.approx(1 / 40, abs=0.003)
-    assert np.mean(corrected) == pytest.approx(0.0, abs=0.003)
-
-
-def variance(means: np.ndarray) -> np.ndarray:
-    return means.var(axis=0, ddof=1)
-
-
-def test_the_interval_of_jackknife_values_covers_the_statistic() -> None:
-    """Three true means with variance 1, 30 seeds of noise."""
-    noise = np.random.default_rng(4).normal(0, 1, size=(1500, 3, 30))
-    samples = noise + np.array([-1.0, 0.0, 1.0])[:, None]
-    values = np.stack([jackknife_values(variance, sample) for sample in samples])
-    low, high = bootstrap(values)
-    assert 0.92 < np.mean((low <= 1.0) & (high >= 1.0)) < 0.98
 
 
 def test_estimates_leave_out_seeds_without_a_value() -> None:
