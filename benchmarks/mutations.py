@@ -353,7 +353,12 @@ MUTATIONS = [
         "2",
         "tests/worlds/test_world_validation.py",
     ),
-    ("worlds/world.py", "np.lexsort((words, distance))", "np.argsort(words)", "tests/worlds"),
+    (
+        "worlds/world.py",
+        "np.lexsort((words(cells), distance[near]))",
+        "words(cells).argsort()",
+        "tests/worlds",
+    ),
     ("worlds/world.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
     ("grid/hexgrid.py", "difference > -y", "difference >= -y", "tests/grid"),
     # Measures and results.
