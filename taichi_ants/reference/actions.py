@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
@@ -14,11 +13,9 @@ from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick
 from taichi_ants.reference.world_state import WorldState
+from taichi_ants.task import Task, Traffic
 from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, SEES_CUE, SEES_EMPTY, SEES_GOAL
 from taichi_ants.task.events import Event
-
-if TYPE_CHECKING:
-    from taichi_ants.task import Task, Traffic
 
 # The field of `Rewards` for each event.
 PAID = {

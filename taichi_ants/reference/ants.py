@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +11,7 @@ from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_STA
 from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells, queens_of
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.task.events import Event
-
-if TYPE_CHECKING:
-    from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import World
 
 Pair = tuple[int, int]  # state, action
 

@@ -7,7 +7,6 @@ word decides whether the ant explores, slips or misreads; its low word decides e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from taichi_ants.reference.observations import cells_in_view, is_better, nestmat
 from taichi_ants.reference.random_stream import WORDS, RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.rules.functions import exp, power
+from taichi_ants.task import Choice, Traffic
 from taichi_ants.task.constants import (
     GIVE,
     LEFT,
@@ -26,9 +26,6 @@ from taichi_ants.task.constants import (
     SEES_EMPTY,
     SEES_GOAL,
 )
-
-if TYPE_CHECKING:
-    from taichi_ants.task import Choice, Traffic
 
 
 def choose_action(

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.reference.geometry import Cell, kinds_of_food, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
-
-if TYPE_CHECKING:
-    from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import World
 
 
 @dataclass(slots=True)

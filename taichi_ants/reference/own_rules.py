@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,11 +24,9 @@ from taichi_ants.reference.observations import (
 )
 from taichi_ants.reference.random_stream import WORDS
 from taichi_ants.reference.world_state import Trail, WorldState, computed
+from taichi_ants.rules import Rule
 from taichi_ants.rules.inputs import Vector
-
-if TYPE_CHECKING:
-    from taichi_ants.rules import Rule
-    from taichi_ants.task import Observation, Task
+from taichi_ants.task import Observation, Task
 
 
 def choose_by_rule(

@@ -6,7 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,14 +20,11 @@ from taichi_ants.reference.geometry import (
     neighbour,
     queens_of,
 )
+from taichi_ants.rules import Parameters, Rule
 from taichi_ants.rules.inputs import Vector
-from taichi_ants.task import Caste
+from taichi_ants.task import Caste, Pheromone, Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
-
-if TYPE_CHECKING:
-    from taichi_ants.rules import Parameters, Rule
-    from taichi_ants.task import Pheromone, Task
-    from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import World
 
 Level = int | np.integer | np.float32
 
