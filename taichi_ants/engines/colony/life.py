@@ -9,6 +9,7 @@ from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below, high_word, stream_of
 from taichi_ants.engines.colony.columns import put, trait
+from taichi_ants.engines.colony.functions import function
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
@@ -31,8 +32,8 @@ from taichi_ants.task.events import Event
 from taichi_ants.task.rules.policy import bit_number
 
 
-@ti.func
-def count(c: ti.template(), v: ti.template(), w, tick):
+@function
+def count(c, v, w, tick):
     """Add the tallies of all chunks to the counts of a world, and reset them."""
     # No `+=`, which would be atomic and slower: one thread processes a world.
     gives = 0
@@ -60,8 +61,8 @@ def count(c: ti.template(), v: ti.template(), w, tick):
         c.worlds[WorldRow.FIRST_DELIVERY, w] = tick + 1
 
 
-@ti.func
-def count_by_nest(c: ti.template(), v: ti.template(), w):
+@function
+def count_by_nest(c, v, w):
     """Add the deliveries of all chunks by nest and kind to those of a world, and reset them."""
     for nest in ti.static(range(v.n_nests)):
         column, of_nest = w * v.n_nests + nest, 0
@@ -77,8 +78,8 @@ def count_by_nest(c: ti.template(), v: ti.template(), w):
             delivered(nest_view(c, v, w, nest), of_nest)
 
 
-@ti.func
-def count_by_caste(c: ti.template(), v: ti.template(), w):
+@function
+def count_by_caste(c, v, w):
     """Add the deliveries of all chunks by caste to those of a world, and reset them."""
     for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
         for i in range(v.n_castes):
@@ -86,8 +87,8 @@ def count_by_caste(c: ti.template(), v: ti.template(), w):
             c.delivered_by_caste[chunk * MAX_CASTES + i] = 0
 
 
-@ti.func
-def free_around(c: ti.template(), base, cell):
+@function
+def free_around(c, base, cell):
     """Return a bit for each heading at which the neighbour of a cell is empty."""
     free = 0
     for heading in ti.static(range(N_HEADINGS)):
@@ -96,15 +97,15 @@ def free_around(c: ti.template(), base, cell):
     return free
 
 
-@ti.func
-def give_birth(c: ti.template(), v: ti.template(), w, tick):
+@function
+def give_birth(c, v, w, tick):
     """Turn stored food into ants next to the queens, while slots and cells are free."""
     for nest in range(v.n_nests):
         give_birth_in(c, v, w, nest)
 
 
-@ti.func
-def give_birth_in(c: ti.template(), v: ti.template(), w, nest):
+@function
+def give_birth_in(c, v, w, nest):
     """Turn stored food of a nest into ants next to its queen."""
     base, column = w * c.size, w * v.n_nests + nest
     queen = c.nests[NestRow.QUEEN_CELL, column]
@@ -130,8 +131,8 @@ def give_birth_in(c: ti.template(), v: ti.template(), w, nest):
         free = free_around(c, base, queen)
 
 
-@ti.func
-def draw_caste(c: ti.template(), v: ti.template(), w, nest):
+@function
+def draw_caste(c, v, w, nest):
     """Return the caste of a newborn ant of a nest, drawn from the queen's stream if needed."""
     caste = 0
     if ti.static(v.n_castes > 1):
@@ -143,8 +144,8 @@ def draw_caste(c: ti.template(), v: ti.template(), w, nest):
     return caste
 
 
-@ti.func
-def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, heading):
+@function
+def place_newborn(c, v, w, nest, ant, cell, heading):
     """Put a newborn ant into a slot and onto a cell."""
     number = c.worlds[WorldRow.NEXT_NUMBER, w]
     c.cell[ant] = cell
@@ -171,8 +172,8 @@ def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, headin
     c.worlds[WorldRow.BIRTHS, w] += 1
 
 
-@ti.func
-def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def grow_old(c, v, w, chunk, ant, tick):
     """Let an ant grow old; if it dies, empty its cell, or leave its food there."""
     if trait(c.stage, ant) == Stage.LIVING:
         dies = False
@@ -191,8 +192,8 @@ def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
                     c.loads[index] = 1
 
 
-@ti.func
-def regrow(c: ti.template(), v: ti.template(), w, tick):
+@function
+def regrow(c, v, w, tick):
     """Let food grow back in empty cells of food sources that have waited long enough."""
     base = w * c.size
     for source in range(
@@ -219,8 +220,8 @@ def regrow(c: ti.template(), v: ti.template(), w, tick):
                 c.worlds[WorldRow.REGROWN, w] += grown
 
 
-@ti.func
-def move_piles(c: ti.template(), v: ti.template(), w, tick):
+@function
+def move_piles(c, v, w, tick):
     """Move every pile, every `c.pile_move_interval` ticks."""
     if c.pile_move_interval > 0:
         if (tick + 1) % c.pile_move_interval == 0:
@@ -228,8 +229,8 @@ def move_piles(c: ti.template(), v: ti.template(), w, tick):
                 move_pile(c, w, pile)
 
 
-@ti.func
-def move_pile(c: ti.template(), w, pile):
+@function
+def move_pile(c, w, pile):
     """Move a pile: all food that can move leaves its cells, then enters the next ones.
 
     So the front of a pile makes way for the food behind it, in any order of the food sources.
@@ -259,14 +260,14 @@ def move_pile(c: ti.template(), w, pile):
                 c.source_of[index] = source
 
 
-@ti.func
-def listed_source(c: ti.template(), w, i):
+@function
+def listed_source(c, w, i):
     """Return the column in `food_sources` of the i-th food source in the order of piles."""
     return w * c.n_food_sources + c.food_sources[FoodSourceRow.LISTED, w * c.n_food_sources + i]
 
 
-@ti.func
-def can_move(c: ti.template(), w, source, step):
+@function
+def can_move(c, w, source, step):
     """Return whether a food source can move by a step.
 
     A source with food can move if the cell ahead is empty, or has food of the same pile that can
@@ -290,8 +291,8 @@ def can_move(c: ti.template(), w, source, step):
     return can
 
 
-@ti.func
-def update_slots(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def update_slots(c, v, w, chunk, ant, tick):
     """Free the slot of a dying ant, and let a newborn ant live, at the end of the tick."""
     if trait(c.stage, ant) == Stage.NEWBORN:
         put(c.stage, ant, Stage.LIVING)
@@ -302,8 +303,8 @@ def update_slots(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             c.first_streams[w * c.n_slots + c.number[ant]] = c.streams[ant]
 
 
-@ti.func
-def end_tick(c: ti.template(), v: ti.template(), w, tick):
+@function
+def end_tick(c, v, w, tick):
     """Count the tick, and end the episode of a world at a delivery if `c.ends_at_delivery`."""
     for tick_ended in ti.static(v.at["tick_ended"]):
         for nest in range(v.n_nests):

@@ -15,6 +15,7 @@ import taichi as ti
 
 from taichi_ants.arithmetic.random_bits import high_word, low_word
 from taichi_ants.engines.colony.columns import individual
+from taichi_ants.engines.colony.functions import function
 from taichi_ants.engines.colony.steps import (
     cell_ahead,
     cue_level,
@@ -115,8 +116,8 @@ def own_rules(rules: Sequence[Rule]) -> dict[Rule, OwnRule]:
     return {rule: OwnRule(rule, first) for rule, first in zip(rules, firsts, strict=False)}
 
 
-@ti.func
-def _number(c: ti.template(), place: ti.template()):
+@function
+def _number(c, place: ti.template()):
     """Return a parameter of a rule."""
     return c.rule_numbers[place]
 
@@ -163,23 +164,20 @@ def _share(word):
     return ti.cast(word, ti.f64) / ti.f64(_WORDS)
 
 
-@ti.func
-def _values(c: ti.template(), v: ti.template(), w, ant, state):
+@function
+def _values(c, v, w, ant, state):
     """Return the action values of an ant in a state, f32 (5,)."""
     return values_of(c.q, table_of(c, v, owner_of(c, v, w, ant)), state)
 
 
-@ti.func
-def _place(c: ti.template(), w, ant):
+@function
+def _place(c, w, ant):
     """Return the place of the cell of an ant in arrays of cells."""
     return w * c.size + c.cell[ant]
 
 
-@ti.func
-def _ahead(
-    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, seen, paper_state,
-    which: ti.template()
-):  # fmt: skip
+@function
+def _ahead(c, v, cues, w, ant, seen, paper_state, which: ti.template()):
     """Return one of the results of `cell_ahead` for the cells ahead, i32 (3,)."""
     values = ti.Vector([0, 0, 0])
     for i in ti.static(range(AHEAD)):
@@ -193,11 +191,8 @@ def _ahead(
     return values
 
 
-@ti.func
-def _levels(
-    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, number: ti.template(), seen,
-    paper_state, tick
-):  # fmt: skip
+@function
+def _levels(c, v, cues, w, ant, number: ti.template(), seen, paper_state, tick):
     """Return the levels ahead of a pheromone, or of the ant's cue for number -1, f64 (3,).
 
     Cells on which no ant can be have level 0, and so do cells that the ant misreads.
