@@ -429,7 +429,7 @@ class Interventions:
             case language.SetTask():
                 self.set_task(change.changed(colony.task))
             case language.SetEpsilon() | language.SetLearningRate():
-                constant = {f"{change.path}_decay": 1.0, f"min_{change.path}": 0.0}
+                constant: dict[str, Any] = {f"{change.path}_decay": 1.0, f"min_{change.path}": 0.0}
                 colony.training = replace(colony.training, **constant)
                 if isinstance(change, language.SetEpsilon):
                     colony.epsilon = change.value

@@ -58,7 +58,9 @@ class Variant:
         self.can_rest = bool(self.at["rests"])
         self.names = names_of(model)
         own = own_inputs.own_rules(model.rules)
-        self.own_choice = model.choice_rule and own[model.choice_rule].choose
+        self.draw_by_cues = steps.draw_cell if model.choice == "deneubourg" else None
+        if model.choice_rule:
+            self.draw_by_cues = own[model.choice_rule].choose
         self.own_reward = model.reward_rule and own[model.reward_rule].pay
         deposits = [rule and own[rule].lay for rule in model.deposit_rules]
         evaporations = [rule and own[rule].evaporate for rule in model.evaporation_rules]

@@ -32,7 +32,6 @@ from taichi_ants.engines.colony.layout import (
     FoodSourceRow,
     NestRow,
     Tally,
-    WorldRow,
 )
 from taichi_ants.engines.colony.trail import (
     deposit,
@@ -43,6 +42,7 @@ from taichi_ants.engines.colony.trail import (
     occasions_of,
 )
 from taichi_ants.engines.colony.views import ant_view
+from taichi_ants.engines.own_rules import for_kernels
 from taichi_ants.engines.views import fill_codes
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
@@ -62,26 +62,7 @@ from taichi_ants.task.constants import (
 )
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import OCCASIONS
-from taichi_ants.task.rules import conflicts, noise, vision
-from taichi_ants.task.rules.actions import (
-    MOVES,
-    is_open,
-    move_event,
-    step_around,
-    step_towards,
-    turn_round,
-    turned_by,
-)
-from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
-from taichi_ants.task.rules.policy import (
-    attraction,
-    best_actions,
-    bit_number,
-    choose_cell,
-    choose_in_crowd,
-    choose_softly,
-    lowest_bit_number,
-)
+from taichi_ants.task.rules import actions, conflicts, delivery, noise, policy, vision
 
 
 @function
@@ -140,9 +121,9 @@ def observe_with(c, v, cues, w, ant, carries, tick):
 def see(c, v, cues, w, ant, tick):
     """Return the paper's state, without values that only other observations need."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
-    left = here + step_towards(c.compass, heading, LEFT)
-    forward = here + step_towards(c.compass, heading, FORWARD)
-    right = here + step_towards(c.compass, heading, RIGHT)
+    left = here + actions.step_towards(c.compass, heading, LEFT)
+    forward = here + actions.step_towards(c.compass, heading, FORWARD)
+    right = here + actions.step_towards(c.compass, heading, RIGHT)
     queen = own_queen(c, v, w, ant)
     ground_left, ground_forward = looks_of(c, v, left, queen), looks_of(c, v, forward, queen)
     ground_right = looks_of(c, v, right, queen)
@@ -206,9 +187,9 @@ def cue_level(c, v, cues, carries, index, tick):
 @function
 def strongest_cue(c, v, cues, carries, here, heading, tick):
     """Return the largest level that counts ahead, in the pheromone of `cue_level`."""
-    left = here + step_towards(c.compass, heading, LEFT)
-    forward = here + step_towards(c.compass, heading, FORWARD)
-    right = here + step_towards(c.compass, heading, RIGHT)
+    left = here + actions.step_towards(c.compass, heading, LEFT)
+    forward = here + actions.step_towards(c.compass, heading, FORWARD)
+    right = here + actions.step_towards(c.compass, heading, RIGHT)
     outbound = ti.static(v.field(c, cues.outbound))
     level = ti.cast(strongest_of(c, outbound, left, forward, right, tick), v.level_type)
     if ti.static(not cues.has_compass):
@@ -227,7 +208,7 @@ def view_around(c, v, cues, w, ant, carries, tick):
     view = v.view_type(carries=carries, own_level=cue_level(c, v, cues, carries, here, tick))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
-        index = here + step_around(c.compass, heading, cells[k])
+        index = here + actions.step_around(c.compass, heading, cells[k])
         held = ti.cast(c.ground[index] >> 4, ti.i32)  # 0 without an ant
         standable = (c.ground[index] & 15 == EMPTY) | (held != 0)
         view.levels[k] = ti.select(standable, cue_level(c, v, cues, carries, index, tick), 0)
@@ -249,13 +230,10 @@ def view_around(c, v, cues, w, ant, carries, tick):
     return view
 
 
-def set_entry(view: Any, name: str, level: Any) -> None:
+@for_kernels
+def set_own_level(view: Any, name: str, level: Any) -> None:
     """Set the level of the ant's own cell in a view, while a kernel compiles."""
     getattr(view, f"own_{name}")._assign(level)
-
-
-# Taichi requires this attribute, with any value, of Python functions that kernels call.
-set_entry._is_taichi_function = False  # type: ignore[attr-defined]
 
 
 @function
@@ -271,7 +249,7 @@ def read_own_levels(c, v, view, here, tick):
     """Set the levels of the ant's own cell in the pheromones that the observation reads."""
     for i in ti.static(range(len(v.reads))):
         level = level_of(ti.static(v.field(c, v.reads[i])), here, tick)
-        set_entry(view, v.observation.reads[i], level)
+        set_own_level(view, v.observation.reads[i], level)
 
 
 @function
@@ -328,25 +306,26 @@ def owner_of(c, v, w, ant):
 def draw_action(c, v, w, ant, state, paper_state, tick, random_state):
     """Return the ant's action in a state, by a random stream that was advanced for it."""
     action, bits = 0, bits_of(random_state)
-    if ti.static(v.own_choice or v.choice == "deneubourg"):
+    if ti.static(v.draw_by_cues):
         if ti.static(len(v.cues) == 1):
-            action = draw_by_cues(
-                c, v, ti.static(v.cues[0]), w, ant, state, paper_state, tick, bits
-            )
+            cues = ti.static(v.cues[0])
+            action = v.draw_by_cues(c, v, cues, w, ant, state, paper_state, tick, bits)
         else:
             for i in ti.static(range(len(v.cues))):
                 if of_caste(c, ant, CasteRow.CUES) == i:
                     cues = ti.static(v.cues[i])
-                    action = draw_by_cues(c, v, cues, w, ant, state, paper_state, tick, bits)
+                    action = v.draw_by_cues(c, v, cues, w, ant, state, paper_state, tick, bits)
     else:
         table = table_of(c, v, owner_of(c, v, w, ant))
         explore_below = explore_below_of(c, v, w, ant)
         if ti.static(v.choice == "softmax"):
             temperature = choice_number(c, v, ant, ti.static(CasteRow.TEMPERATURE))
-            action = choose_softly(values_of(c.q, table, state), bits, explore_below, temperature)
+            action = policy.choose_softly(
+                values_of(c.q, table, state), bits, explore_below, temperature
+            )
         else:
             best = best_actions_of(c, v, table, state)
-            action = choose_in_crowd(c.compass, best, bits, explore_below)
+            action = policy.choose_in_crowd(c.compass, best, bits, explore_below)
     return action
 
 
@@ -355,21 +334,10 @@ def best_actions_of(c, v, table, state):
     """Return the `best_actions` of a state; they are stored unless ants have their own tables."""
     best = 0
     if ti.static(v.independent):
-        best = best_actions(values_of(c.q, table, state))
+        best = policy.best_actions(values_of(c.q, table, state))
     else:
         best = ti.cast(c.q[table + state * ROW + BEST_AT], ti.i32)
     return best
-
-
-@function
-def draw_by_cues(c, v, cues, w, ant, state, paper_state, tick, bits):
-    """Return the ant's action by your own rule, or by the rule "deneubourg"."""
-    action = 0
-    if ti.static(v.own_choice):
-        action = v.own_choice(c, v, cues, w, ant, state, paper_state, tick, bits)
-    else:
-        action = draw_cell(c, v, cues, w, ant, state, bits)
-    return action
 
 
 @function
@@ -398,9 +366,9 @@ def cell_ahead(c, v, cues, w, ant, state, paper_state, i: ti.template()):
     heading, carries = trait(c.heading, ant), trait(c.carries, ant)
     code = vision.code_in_view(state, i)
     is_true = code == vision.code_in_view(paper_state, i)
-    opens = ti.cast(is_open(code), ti.i32)
+    opens = ti.cast(actions.is_open(code), ti.i32)
     nears = ti.cast(code == SEES_CUE, ti.i32) & ti.static(int(cues.has_compass))
-    index = w * c.size + c.cell[ant] + step_towards(c.compass, heading, i)
+    index = w * c.size + c.cell[ant] + actions.step_towards(c.compass, heading, i)
     if is_true & (c.ground[index] >> 4 != 0):  # an ant stands there
         nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
         nears = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(cues.has_compass))
@@ -434,19 +402,15 @@ def choice_number(c, v, ant, row):
 
 
 @function
-def draw_cell(c, v, cues, w, ant, state, bits):
+def draw_cell(c, v, cues, w, ant, state, paper_state, tick, bits):
     """Return the ant's action by the rule "deneubourg", with 64 random bits.
 
-    `state` is the paper's state as the ant sees it. A cell that it misreads looks as if it had no
-    trail, and is nearer to the queen if it looks S. With a field as homing cue, no cell is nearer.
+    `state` is the paper's state as the ant sees it, `paper_state` the true one. A cell that it
+    misreads looks as if it had no trail, and is nearer to the queen if it looks S. With a field as
+    homing cue, no cell is nearer.
     """
-    paper_state, heading, carries = (
-        trait(c.paper_state, ant),
-        trait(c.heading, ant),
-        trait(c.carries, ant),
-    )
+    heading, carries = trait(c.heading, ant), trait(c.carries, ant)
     here = w * c.size + c.cell[ant]
-    tick = c.worlds[WorldRow.TICKS, w]
     codes, opens, nears = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
     weights = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
     k = choice_number(c, v, ant, ti.static(CasteRow.K))
@@ -455,10 +419,10 @@ def draw_cell(c, v, cues, w, ant, state, bits):
         codes[i], is_true, opens[i], nears[i] = cell_ahead(
             c, v, cues, w, ant, state, paper_state, i
         )
-        index = here + step_towards(c.compass, heading, i)
+        index = here + actions.step_towards(c.compass, heading, i)
         level = cue_level(c, v, cues, carries, index, tick)
-        weights[i] = attraction(ti.select(is_true == 1, level, 0), k, exponent)
-    return choose_cell(carries, codes, opens, nears, weights, bits)
+        weights[i] = policy.attraction(ti.select(is_true == 1, level, 0), k, exponent)
+    return policy.choose_cell(carries, codes, opens, nears, weights, bits)
 
 
 @function
@@ -498,22 +462,22 @@ def want(c, v, w, chunk, ant, tick):
     for execute in ti.static(v.at["execute"]):
         if resting == 0:
             action, random_state = execute(ant_view(c, v, w, ant), action, random_state)
-    heading = turned_by(c.compass, trait(c.heading, ant), action)
-    step = step_towards(c.compass, heading, FORWARD)
+    heading = actions.turned_by(c.compass, trait(c.heading, ant), action)
+    step = actions.step_towards(c.compass, heading, FORWARD)
     # Arithmetic, because the compiler makes branches of selections between values in memory.
     enters = 1 - (vision.code_in_view(paper_state, action) & 1)
     if ti.static(v.traffic.shared):
         enters |= ti.cast(holds_nestmate(c, v, ant, w * c.size + cell + step), ti.i32)
-    enters &= MOVES >> action
+    enters &= actions.MOVES >> action
     wanted = cell + enters * step
     mark = v.mark_of_rest + enters * (conflicts.ENTER + heading - v.mark_of_rest)
     foods = vision.goals_in_view(paper_state) * (1 - carries)  # no branch by `carries`
     if (foods != 0) & (action == PICK_UP):
-        position = lowest_bit_number(foods)
+        position = policy.lowest_bit_number(foods)
         if foods & (foods - 1) != 0:  # several food items in view
             k, random_state = draw_below(random_state, popcnt(foods))
-            position = bit_number(foods, k)
-        wanted = cell + step_towards(c.compass, heading, position)
+            position = policy.bit_number(foods, k)
+        wanted = cell + actions.step_towards(c.compass, heading, position)
         mark = conflicts.TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
     if ti.static(v.traffic.shared):
         takes = ti.select(mark >= conflicts.TAKE, conflicts.TAKES_FOOD, 0)
@@ -550,14 +514,14 @@ def resolve(c, v, w, chunk, ant, tick):
 @function
 def step_ahead(c, ant):
     """Return the index step to the cell ahead of an ant."""
-    return step_towards(c.compass, trait(c.heading, ant), FORWARD)
+    return actions.step_towards(c.compass, trait(c.heading, ant), FORWARD)
 
 
 @function
 def event_of(c, v, w, ant, tick):
     """Return the event of a successful move; a cell with an ant shows a cue if it is better."""
     action, paper_state = executed_by(c, v, ant), trait(c.paper_state, ant)
-    event = move_event(vision.code_in_view(paper_state, action))
+    event = actions.move_event(vision.code_in_view(paper_state, action))
     here = w * c.size + c.cell[ant]
     ahead = here + step_ahead(c, ant)
     if conflicts.had_ant(c, ahead):  # rare, so that few trails are read
@@ -599,7 +563,7 @@ def act(c, v, w, chunk, ant, tick):
     action, paper_state = executed_by(c, v, ant), trait(c.paper_state, ant)
     cell, wanted = c.cell[ant], c.want[ant]
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
-    moves = MOVES >> action & 1
+    moves = actions.MOVES >> action & 1
     goes, filled, enters, takes = cell, False, 0, False
     event = Event.FAILED + moves * ti.static(Event.BLOCKED - Event.FAILED)
     if ti.static(v.traffic.shared):
@@ -626,11 +590,11 @@ def act(c, v, w, chunk, ant, tick):
                 if lays(c, v, ant, 0):
                     index = base + goes
                     deposit(c, v, trail, w, ant, index, tick, carried, carries, event, paper_state)
-        elif can_give(action, paper_state):
+        elif delivery.can_give(action, paper_state):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
             put(c.carries, ant, 0)
-            put(c.heading, ant, heading_after_delivery(heading, c.turns_at_queen))
+            put(c.heading, ant, delivery.heading_after_delivery(heading, c.turns_at_queen))
             tally(c, Tally.DELIVERIES, chunk, 1)
             count_apart(c, v, ant, chunk)
             for gave in ti.static(v.at["gave"]):
@@ -645,7 +609,7 @@ def act(c, v, w, chunk, ant, tick):
             if lays(c, v, ant, 0):
                 deposit(c, v, trail, w, ant, base + wanted, tick, 0, carries, event, paper_state)
                 deposit(c, v, trail, w, ant, base + cell, tick, 0, carries, event, paper_state)
-        put(c.heading, ant, turn_round(heading))
+        put(c.heading, ant, actions.turn_round(heading))
     if ti.static(len(v.pheromones) > 1):
         age = ti.select(carries == had_food, age, 0)
         occasions = occasions_of(had_food, paper_state, action, event, goes != cell)
