@@ -79,14 +79,14 @@ class Interventions:
                 else:
                     self._remove([ant for ant in ants if ant.cell in cells])
             case language.AddAnts(cells=None):
-                self._add_some(self._amount(change), change.heading, change.nest)
+                self._add_some(self._amount(change), change.nest)
             case language.AddAnts():
                 nests = range(len(world.queens)) if change.nest is None else [change.nest]
                 nearest = [
                     min(nests, key=lambda nest: distance(cell, world.queens[nest]))
                     for cell in cells
                 ]
-                self._add(cells, nearest, change.heading)
+                self._add(cells, nearest)
             case language.SetAnts():
                 ants, self.ants = self._ants(), change.number
                 self._remove(ants[change.number :])
@@ -180,22 +180,20 @@ class Interventions:
         self._foods.pop(cell, None)
         self.colony.food_sources.end(cell)
 
-    def _add(self, cells: Sequence[Cell], nests: Sequence[int], heading: int | None) -> None:
-        """Put ants on those of the cells that are empty; draw each heading if none is given."""
+    def _add(self, cells: Sequence[Cell], nests: Sequence[int]) -> None:
+        """Put ants on those of the cells that are empty."""
         colony = self.colony
         pairs = zip(cells, nests, strict=True)
         free = [(cell, nest) for cell, nest in pairs if colony.world.content(cell) == EMPTY]
-        headings = [heading or 0 for _ in free]
-        if heading is None:
-            headings = [pick(self._stream.draw()[0], N_HEADINGS) for _ in free]
+        headings = [pick(self._stream.draw()[0], N_HEADINGS) for _ in free]
         castes = [
             draw_caste(colony.castes, nest, colony.starting[nest], self._stream) for _, nest in free
         ]
-        for (cell, nest), towards, caste in zip(free, headings, castes, strict=True):
+        for (cell, nest), heading, caste in zip(free, headings, castes, strict=True):
             slot = next(slot for slot in range(colony.slots) if slot not in colony.ants)
-            colony.new_ant(cell, towards, slot, nest, caste)
+            colony.new_ant(cell, heading, slot, nest, caste)
 
-    def _add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> None:
+    def _add_some(self, n: int, nest: int | None = None) -> None:
         """Put n ants on free cells, in the order of `ants.starts`; without a nest, by turns."""
         colony, world = self.colony, self.colony.world
         by_turns = range(len(world.queens)) if nest is None else [nest]
@@ -208,7 +206,7 @@ class Interventions:
         for number in nests:
             free = (cell for cell in orders[number] if world.content(cell) == EMPTY)
             cells.append(next(cell for cell in free if cell not in cells))
-        self._add(cells, nests, heading)
+        self._add(cells, nests)
 
     def _remove(self, ants: Iterable[Ant]) -> None:
         """Remove ants with their food."""

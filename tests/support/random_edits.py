@@ -28,10 +28,7 @@ def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[
         return {kind: {"what": str(rng.choice(["rock", "food"])), "cells": some}}
     if kind == "trail":
         return {kind: {"level": int(rng.choice([0, 1, 20, 250, 9999])), "cells": some}}
-    if kind == "add_ants":
-        heading = int(rng.integers(6)) if rng.random() < 0.5 else None
-        return {kind: {"cells": some, "heading": heading}}
-    if kind in ("clear", "remove_ants"):
+    if kind in ("clear", "add_ants", "remove_ants"):
         return {kind: {"cells": some}}
     if kind == "queen":
         free = there[ground[there] == EMPTY] if rng.random() < 0.8 else there

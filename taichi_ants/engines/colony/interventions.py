@@ -116,13 +116,13 @@ class _World:
     def add_ants(self, change: language.AddAnts) -> Change:
         """Put newborn ants on free start cells, or on those of the cells given that are empty."""
         if change.cells is None:
-            return self._add_some(self._amount(change), change.heading, change.nest)
+            return self._add_some(self._amount(change), change.nest)
         cells = self._index(change.cells)
         grid, queens = self.colony.grid, self.colony.grid.cells(self.queen_cells).tolist()
         nests = np.argmin([grid.distances(tuple(queen))[cells] for queen in queens], axis=0)
         if change.nest is not None:
             nests = np.full(len(cells), change.nest)
-        return self._add(cells, nests, change.heading)
+        return self._add(cells, nests)
 
     def remove_ants(self, change: language.RemoveAnts) -> Change:
         """Remove random ants, or those on cells, with the food that they carry."""
@@ -169,7 +169,7 @@ class _World:
         self._fill(np.array([cell]), EMPTY)
         self._fill(np.array([to]), what, number, loads)
 
-    def _add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> Change:
+    def _add_some(self, n: int, nest: int | None = None) -> Change:
         """Put newborn ants on free start cells; without a nest, nests take turns.
 
         AntsError if there is too little room.
@@ -184,7 +184,7 @@ class _World:
         nests = np.resize(range(colony.n_nests) if nest is None else [nest], n)
         queens = grid.cells(self.queen_cells)
         cells = free_cells(grid, free, queens, nests, colony.seeds[self.w], colony.start)
-        return self._add(cells, nests, heading)
+        return self._add(cells, nests)
 
     def _index(self, cells: Sequence[Any] | str) -> np.ndarray:
         """Return the flat indices of cells, or of those of a region, without duplicates."""
@@ -314,7 +314,7 @@ class _World:
         clock = self.colony.trail_clock(self.w, number)
         self.colony.stored_pheromone(self.w, number)[cells] = level + clock if level else 0
 
-    def _add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None) -> Change:
+    def _add(self, cells: np.ndarray, nests: np.ndarray) -> Change:
         """Put newborn ants of some nests on those of the cells that are empty."""
         colony, ground, rows = self.colony, self.view("ground"), self.rows
         free = ground[cells] == EMPTY
@@ -328,9 +328,7 @@ class _World:
         yield
         slots = np.flatnonzero(self.view("stage") == Stage.VACANT)[:n]
         numbers = rows[WorldRow.NEXT_NUMBER] + np.arange(n)
-        headings: Any = heading
-        if heading is None:
-            headings = choose(self.all.stream(self.w).bits(n) >> np.uint64(32), N_HEADINGS)
+        headings = choose(self.all.stream(self.w).bits(n) >> np.uint64(32), N_HEADINGS)
         castes: Any = 0
         if len(colony.task.castes) > 1:
             drawn = (self.all.stream(self.w).bits(n) >> np.uint64(32)) / 2.0**32
