@@ -42,9 +42,9 @@ from taichi_ants.engines.colony.trail import (
     occasions_of,
 )
 from taichi_ants.engines.colony.views import ant_view
-from taichi_ants.engines.own_rules import for_kernels
 from taichi_ants.engines.views import fill_codes
 from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task.constants import (
     BEST_AT,
@@ -230,8 +230,8 @@ def view_around(c, v, cues, w, ant, carries, tick):
     return view
 
 
-@for_kernels
-def set_own_level(view: Any, name: str, level: Any) -> None:
+@while_compiling
+def set_entry(view: Any, name: str, level: Any) -> None:
     """Set the level of the ant's own cell in a view, while a kernel compiles."""
     getattr(view, f"own_{name}")._assign(level)
 
@@ -249,7 +249,7 @@ def read_own_levels(c, v, view, here, tick):
     """Set the levels of the ant's own cell in the pheromones that the observation reads."""
     for i in ti.static(range(len(v.reads))):
         level = level_of(ti.static(v.field(c, v.reads[i])), here, tick)
-        set_own_level(view, v.observation.reads[i], level)
+        set_entry(view, v.observation.reads[i], level)
 
 
 @function
