@@ -16,7 +16,7 @@ from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
 from taichi_ants.engines.colony import columns, learning, life, own_inputs, steps, trail
-from taichi_ants.engines.colony.functions import function
+from taichi_ants.engines.colony.columns import function
 from taichi_ants.engines.colony.layout import (
     GAVE_UP,
     Barrier,

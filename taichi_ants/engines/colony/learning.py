@@ -10,7 +10,7 @@ import taichi as ti
 
 from taichi_ants.arithmetic.random_bits import advance, draw_below
 from taichi_ants.engines.colony import columns, steps
-from taichi_ants.engines.colony.functions import function
+from taichi_ants.engines.colony.columns import function
 from taichi_ants.engines.colony.layout import CasteRow, Stage, SumRow, Tally
 from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.learners import model

@@ -8,8 +8,7 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below, high_word, stream_of
-from taichi_ants.engines.colony.columns import put, trait
-from taichi_ants.engines.colony.functions import function
+from taichi_ants.engines.colony.columns import function, put, trait
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,

@@ -16,8 +16,7 @@ from taichi.lang.impl import subscript
 
 from taichi_ants.arithmetic.random_bits import high_word, low_word
 from taichi_ants.engines.colony import steps
-from taichi_ants.engines.colony.columns import individual, trait
-from taichi_ants.engines.colony.functions import function
+from taichi_ants.engines.colony.columns import function, individual, trait
 from taichi_ants.engines.colony.trail import level_of
 from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.engines.own_rules import bounded_function

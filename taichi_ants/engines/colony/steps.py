@@ -20,8 +20,15 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below
-from taichi_ants.engines.colony.columns import group_of, individual, nest_of, of_caste, put, trait
-from taichi_ants.engines.colony.functions import function
+from taichi_ants.engines.colony.columns import (
+    function,
+    group_of,
+    individual,
+    nest_of,
+    of_caste,
+    put,
+    trait,
+)
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
