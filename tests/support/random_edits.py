@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.live import edits
 from taichi_ants.reference.interventions import Interventions as PlainInterventions
+from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.task.constants import EMPTY
 
 KINDS = (
@@ -51,10 +53,23 @@ def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[
 
 def apply_to_both(
     edit: dict[str, Any], interventions: Interventions, plain: PlainInterventions
-) -> None:
-    """Apply an edit to a colony and to its twin; raises AntsError if the world forbids it."""
+) -> PlainInterventions:
+    """Apply an edit to a colony and to its twin; raises AntsError if the world forbids it.
+
+    An episode begins in the world that the interventions have made, with new interventions.
+    """
     change: Any = edits.checked(edit, interventions)
     interventions.apply(change)
+    if "episode" in edit:
+        colony = plain.colony
+        colony.end_episode()
+        colony.n_ants = interventions.ants
+        for number in range(len(colony.streams), colony.n_ants):
+            state = stream_state(colony.seed, STREAM_ANT, number)
+            colony.streams.append(RandomStream(state))
+        colony.begin_episode(interventions.world())
+        return PlainInterventions(colony)
     if getattr(change, "cells", None):
         change = replace(change, cells=interventions.colony.grid.cells(change.cells).tolist())
     plain.apply(change)
+    return plain

@@ -99,35 +99,31 @@ def free_around(c, base, cell):
 @function
 def give_birth(c, v, w, tick):
     """Turn stored food into ants next to the queens, while slots and cells are free."""
+    base = w * c.size
     for nest in range(v.n_nests):
-        give_birth_in(c, v, w, nest)
-
-
-@function
-def give_birth_in(c, v, w, nest):
-    """Turn stored food of a nest into ants next to its queen."""
-    base, column = w * c.size, w * v.n_nests + nest
-    queen = c.nests[NestRow.QUEEN_CELL, column]
-    free = free_around(c, base, queen)
-    while (
-        c.nests[NestRow.STORE, column] > 0
-        and c.worlds[WorldRow.LIVING, w] < c.n_slots
-        and free != 0
-    ):
-        k, c.queen_streams[w] = draw_below(c.queen_streams[w], popcnt(free))
-        heading = bit_number(free, k)
-        slot = c.worlds[WorldRow.FIRST_VACANT, w]
-        while trait(c.stage, w * c.n_slots + slot) != Stage.VACANT:
-            slot += 1
-        c.worlds[WorldRow.FIRST_VACANT, w] = slot + 1
-        c.worlds[WorldRow.TOP, w] = ti.max(c.worlds[WorldRow.TOP, w], slot + 1)
-        if ti.static(v.n_castes > 0):
-            put(c.caste, w * c.n_slots + slot, draw_caste(c, v, w, nest))
-        place_newborn(c, v, w, nest, w * c.n_slots + slot, queen + c.compass[heading + 1], heading)
-        if ti.static(v.independent):
-            reset_slot(c, v, w * c.n_slots + slot)
-        c.nests[NestRow.STORE, column] -= 1
+        column = w * v.n_nests + nest
+        queen = c.nests[NestRow.QUEEN_CELL, column]
         free = free_around(c, base, queen)
+        while (
+            c.nests[NestRow.STORE, column] > 0
+            and c.worlds[WorldRow.LIVING, w] < c.n_slots
+            and free != 0
+        ):
+            k, c.queen_streams[w] = draw_below(c.queen_streams[w], popcnt(free))
+            heading = bit_number(free, k)
+            slot = c.worlds[WorldRow.FIRST_VACANT, w]
+            while trait(c.stage, w * c.n_slots + slot) != Stage.VACANT:
+                slot += 1
+            c.worlds[WorldRow.FIRST_VACANT, w] = slot + 1
+            c.worlds[WorldRow.TOP, w] = ti.max(c.worlds[WorldRow.TOP, w], slot + 1)
+            ant = w * c.n_slots + slot
+            if ti.static(v.n_castes > 0):
+                put(c.caste, ant, draw_caste(c, v, w, nest))
+            place_newborn(c, v, w, nest, ant, queen + c.compass[heading + 1], heading)
+            if ti.static(v.independent):
+                reset_slot(c, v, ant)
+            c.nests[NestRow.STORE, column] -= 1
+            free = free_around(c, base, queen)
 
 
 @function
@@ -194,29 +190,32 @@ def grow_old(c, v, w, chunk, ant, tick):
 @function
 def regrow(c, v, w, tick):
     """Let food grow back in empty cells of food sources that have waited long enough."""
-    base = w * c.size
-    for source in range(
-        w * c.n_food_sources, w * c.n_food_sources + c.worlds[WorldRow.FOOD_SOURCES, w]
-    ):
+    first = w * c.n_food_sources
+    for source in range(first, first + c.worlds[WorldRow.FOOD_SOURCES, w]):
         taken = c.food_sources[FoodSourceRow.TAKEN, source]
         waits, kind = c.regrowth, 0
         if ti.static(v.n_kinds > 1):
             kind = c.food_sources[FoodSourceRow.KIND, source]
         if ti.static(v.has_foods):
             waits = c.food_numbers[FoodRow.REGROWTH, kind]
-        if waits >= 0 and taken >= 0 and tick >= taken + waits:
-            index = base + c.food_sources[FoodSourceRow.CELL, source]
-            if c.ground[index] == EMPTY:
-                c.ground[index] = FOOD
-                grown = 1
-                if ti.static(v.n_kinds > 1):
-                    c.kind_of[index] = ti.cast(kind, ti.u8)
-                if ti.static(v.has_loads):
-                    grown = c.food_numbers[FoodRow.LOADS, kind]
-                    c.loads[index] = grown
-                c.source_of[index] = source
-                c.food_sources[FoodSourceRow.TAKEN, source] = -1
-                c.worlds[WorldRow.REGROWN, w] += grown
+        index = place_of(c, w, source)
+        if waits >= 0 and taken >= 0 and tick >= taken + waits and c.ground[index] == EMPTY:
+            grown = 1
+            if ti.static(v.n_kinds > 1):
+                c.kind_of[index] = ti.cast(kind, ti.u8)
+            if ti.static(v.has_loads):
+                grown = c.food_numbers[FoodRow.LOADS, kind]
+                c.loads[index] = grown
+            c.ground[index] = FOOD
+            c.source_of[index] = source
+            c.food_sources[FoodSourceRow.TAKEN, source] = -1
+            c.worlds[WorldRow.REGROWN, w] += grown
+
+
+@function
+def place_of(c, w, source):
+    """Return the place of a food source in the arrays of cells."""
+    return w * c.size + c.food_sources[FoodSourceRow.CELL, source]
 
 
 @function
@@ -225,7 +224,7 @@ def move_piles(c, v, w, tick):
     if c.pile_move_interval > 0:
         if (tick + 1) % c.pile_move_interval == 0:
             for pile in range(c.worlds[WorldRow.PILES, w]):
-                move_pile(c, w, pile)
+                move_pile(c, w, w * (c.n_food_sources + 1) + pile)
 
 
 @function
@@ -235,34 +234,20 @@ def move_pile(c, w, pile):
     So the front of a pile makes way for the food behind it, in any order of the food sources.
     """
     heading, c.queen_streams[w] = draw_below(c.queen_streams[w], N_HEADINGS)
-    step = c.compass[heading + 1]
-    begins = w * (c.n_food_sources + 1) + pile
-    for i in range(c.piles[begins], c.piles[begins + 1]):
-        source = listed_source(c, w, i)
+    step, first = c.compass[heading + 1], w * c.n_food_sources
+    for i in range(first + c.piles[pile], first + c.piles[pile + 1]):
+        source = first + c.food_sources[FoodSourceRow.LISTED, i]
         c.food_sources[FoodSourceRow.MOVES, source] = ti.cast(can_move(c, w, source, step), ti.i32)
-    for i in range(c.piles[begins], c.piles[begins + 1]):
-        source = listed_source(c, w, i)
-        if (
-            c.food_sources[FoodSourceRow.MOVES, source] == 1
-            and c.food_sources[FoodSourceRow.TAKEN, source] < 0
-        ):
-            index = w * c.size + c.food_sources[FoodSourceRow.CELL, source]
-            c.ground[index] = EMPTY
-            c.source_of[index] = -1
-    for i in range(c.piles[begins], c.piles[begins + 1]):
-        source = listed_source(c, w, i)
-        if c.food_sources[FoodSourceRow.MOVES, source] == 1:
-            c.food_sources[FoodSourceRow.CELL, source] += step
-            if c.food_sources[FoodSourceRow.TAKEN, source] < 0:
-                index = w * c.size + c.food_sources[FoodSourceRow.CELL, source]
-                c.ground[index] = FOOD
-                c.source_of[index] = source
-
-
-@function
-def listed_source(c, w, i):
-    """Return the column in `food_sources` of the i-th food source in the order of piles."""
-    return w * c.n_food_sources + c.food_sources[FoodSourceRow.LISTED, w * c.n_food_sources + i]
+    for enters in ti.static((False, True)):
+        for i in range(first + c.piles[pile], first + c.piles[pile + 1]):
+            source = first + c.food_sources[FoodSourceRow.LISTED, i]
+            if c.food_sources[FoodSourceRow.MOVES, source] == 1:
+                if ti.static(enters):
+                    c.food_sources[FoodSourceRow.CELL, source] += step
+                if c.food_sources[FoodSourceRow.TAKEN, source] < 0:
+                    index = place_of(c, w, source)
+                    c.ground[index] = ti.static(FOOD if enters else EMPTY)
+                    c.source_of[index] = source if ti.static(enters) else -1
 
 
 @function
@@ -272,20 +257,13 @@ def can_move(c, w, source, step):
     A source with food can move if the cell ahead is empty, or has food of the same pile that can
     move: food in a row moves together. A waiting source can move unless rock or queen is ahead.
     """
-    ahead = w * c.size + c.food_sources[FoodSourceRow.CELL, source] + step
+    ahead = place_of(c, w, source) + step
     can = c.walls[ahead] == 0 and c.ground[ahead] & 15 != QUEEN
     if c.food_sources[FoodSourceRow.TAKEN, source] < 0:
-        in_row = True
-        while in_row:
-            in_row = False
+        pile, other = c.food_sources[FoodSourceRow.PILE, source], c.source_of[ahead]
+        while other >= 0 and c.food_sources[FoodSourceRow.PILE, ti.max(other, 0)] == pile:
+            ahead += step
             other = c.source_of[ahead]
-            if other >= 0:
-                in_row = (
-                    c.food_sources[FoodSourceRow.PILE, other]
-                    == c.food_sources[FoodSourceRow.PILE, source]
-                )
-            if in_row:
-                ahead += step
         can = c.ground[ahead] == EMPTY
     return can
 
