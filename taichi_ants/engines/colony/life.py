@@ -246,7 +246,7 @@ def move_pile(c, w, pile):
                     c.food_sources[FoodSourceRow.CELL, source] += step
                 if c.food_sources[FoodSourceRow.TAKEN, source] < 0:
                     index = place_of(c, w, source)
-                    c.ground[index] = ti.static(FOOD if enters else EMPTY)
+                    c.ground[index] = FOOD if ti.static(enters) else EMPTY
                     c.source_of[index] = source if ti.static(enters) else -1
 
 
