@@ -1,5 +1,1 @@
-"""Reports of studies as web pages: one file each, which works offline.
-
-Templates (`*.html`) share one style (`report.css`) and one script (`report.js`); the scripts of the
-viewer play the recordings.
-"""
+"""Descriptions of the models of studies."""
