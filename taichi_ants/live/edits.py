@@ -1,8 +1,7 @@
 """Edits: the interventions that pages send, and the numbers that their sliders change.
 
 An edit is JSON, a mapping from the name of an intervention to its settings or its short form, see
-`taichi_ants.interventions`. In the log of a session, its cells are flat indices. "episode" ends the
-episode and begins the next one.
+`taichi_ants.interventions`. "episode" ends the episode and begins the next one.
 """
 
 from __future__ import annotations
@@ -10,13 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.interventions import Intervention
 from taichi_ants.rules.rule import Parameters
 from taichi_ants.settings import declared
 
@@ -94,20 +91,3 @@ def _of_rules(rules: Mapping[str, Parameters]) -> dict[str, Value]:
             path = f"task.rules.{name}.{setting.name}"
             values[f"{name}.{setting.name}"] = Value(value, least, most, step, path, help=help)
     return values
-
-
-def checked(edit: object, interventions: Interventions) -> Intervention:
-    """Return the intervention of an edit, its cells as flat indices; the world may still refuse it.
-
-    Raises:
-        AntsError: The edit is not valid; the message says why.
-    """
-    intervention, colony = language.from_dict(edit), interventions.colony
-    if (cells := getattr(intervention, "cells", None)) is None:
-        return intervention
-    if isinstance(cells, str):
-        flat = colony.worlds[0].region(cells).tolist()
-    else:
-        flat = language.flat_indices(colony.grid, cells)
-    # `Clear` stands for any intervention with cells.
-    return replace(cast(language.Clear, intervention), cells=flat)

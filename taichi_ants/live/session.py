@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import files
+from taichi_ants import files, interventions
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.files.archives import Kind
@@ -175,7 +175,7 @@ class Session:
         return self.recorder.snapshot()
 
     def _do(self, edit: object, goes_on: bool = False) -> None:
-        intervention = edits.checked(edit, self.interventions)
+        intervention = interventions.from_dict(edit)
         plain = intervention.facts()
         check_most("edits", len(self.edits) + 1)
         check_most("cells in all edits", self._cells + cells_of(plain))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.live import edits
@@ -58,7 +59,7 @@ def apply_to_both(
 
     An episode begins in the world that the interventions have made, with new interventions.
     """
-    change: Any = edits.checked(edit, interventions)
+    change: Any = language.from_dict(edit)
     interventions.apply(change)
     if "episode" in edit:
         colony = plain.colony
