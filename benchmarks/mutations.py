@@ -330,7 +330,7 @@ MUTATIONS = [
     ("live/server.py", "self._runs and bool(self._pages)", "self._runs", SERVER),
     ("live/server.py", "self._joined < _MOST_PAGES", "self._joined <= _MOST_PAGES", SERVER),
     ("live/server.py", 'request.get("do") in _CHANGES', "False", SERVER),
-    ("live/server.py", "in_a_row or before.same(session)", "in_a_row", SERVER),
+    ("live/server.py", "in_a_row or before.to_bytes() == session.to_bytes()", "in_a_row", SERVER),
     # Worlds and the grid.
     (
         "worlds/open_world.py",

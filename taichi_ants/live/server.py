@@ -358,7 +358,7 @@ class SessionServer:
         """
         before = self.session
         in_a_row = undoes and self._undone == (before.steps, len(before.edits))
-        if comes_back or not (in_a_row or before.same(session)):
+        if comes_back or not (in_a_row or before.to_bytes() == session.to_bytes()):
             self._previous = before
         self._undone = (session.steps, len(session.edits)) if undoes else None
         self.session, self._shown = session, secrets.token_hex(8)

@@ -269,11 +269,6 @@ class Session:
         self.recorder.snapshot()
         yield self
 
-    def same(self, other: Session) -> bool:
-        """Return whether both sessions have the same setup, edits and state."""
-        mine, others = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
-        return mine == others and self.interventions.state() == other.interventions.state()
-
     def undone(self) -> tuple[Iterator[Session], int]:
         """Return an iterator like `replay` that ends before the last change, and its steps then.
 

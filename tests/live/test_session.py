@@ -167,7 +167,6 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
     log = Log(session.setup, done, undone.steps, None, None, changes=changes)
     *_, again = Session.replay(log)
     assert undone.steps == session.edits[last][0]
-    assert undone.same(again)
     assert undone.to_bytes() == again.to_bytes()
     assert undone.ticks == again.ticks
     for one in (undone, again):
@@ -176,7 +175,7 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
         present = list(one.colony.snapshot().fields.values())
         assert len(seen.fields) == len(present)
         assert all(map(np.array_equal, seen.fields, present))
-    assert undone.same(again)
+    assert undone.to_bytes() == again.to_bytes()
     assert session.interventions.state() == stands
 
 
