@@ -396,8 +396,8 @@ MUTATIONS = [
     ("analysis/sensitivity.py", "(seeds - 1)) / seeds", "(seeds - 1))", SENSITIVITY),
     ("analysis/sensitivity.py", '"seed": RANDOM_SEED', '"seed": 0', SENSITIVITY),
     # Archives of studies, and descriptions of models.
-    ("studies/archive.py", "> MOST_BYTES:", "> 2 * MOST_BYTES:", ARCHIVE),
-    ("commands/reproduce.py", "sum(map(bool, found", "0 * sum(map(bool, found", ARCHIVE),
+    ("commands/reproduce.py", "> MOST_BYTES:", "> 2 * MOST_BYTES:", ARCHIVE),
+    ("commands/reproduce.py", "sum(map(bool, diff", "0 * sum(map(bool, diff", ARCHIVE),
     ("commands/reproduce.py", "if not settings.trust_code:", "if False:", ARCHIVE),
     ("files/inputs.py", "return copy or path", "return path", ARCHIVE),
     ("report/odd.py", 'return row.get(f"{group}.{other}") in needed', "return True", ODD),

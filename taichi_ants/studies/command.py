@@ -55,7 +55,7 @@ class Planned:
         plan: The object that the module's `plan` has returned.
         code: The plugin and the file of the module, as far as there are any.
         inputs: The contents of all files that the study has read, by their paths in a folder.
-        facts: Facts from which `opened` plans the same study again.
+        asked: What the study asks for, as JSON has it, in folders of results.
     """
 
     module: Any
@@ -63,17 +63,7 @@ class Planned:
     study: Study
     code: list[Code]
     inputs: Mapping[str, bytes]
-    facts: Mapping[str, Any]
-
-    def asked(self) -> dict[str, Any]:
-        """Return what the study asks for, as JSON in folders of results."""
-        study = self.study
-        asked = {
-            **{"version": __version__, "physics": PHYSICS, **self.facts},
-            **{"points": study.keys, "seeds": study.seeds, "arrays": study.arrays},
-            **{"seconds": study.seconds[:, 0], "families": study.families},
-        }
-        return json.loads(files.to_json(asked))
+    asked: Mapping[str, Any]
 
 
 def planned(module: str, settings: Namespace) -> Planned:
@@ -110,9 +100,15 @@ def planned(module: str, settings: Namespace) -> Planned:
         names = (f"{INPUTS}/{f'{n}-' if n > 1 else ''}{base}" for n in itertools.count(1))
         copies[path] = next(name for name in names if name not in inputs)
         inputs[copies[path]] = content
-    facts = {"module": module, "options": options, "plugin": plugin, "arch": arch, "inputs": copies}
-    facts["settings"] = settings_of(study.points, study.seeds) | getattr(plan, "facts", dict)()
-    return Planned(loaded, plan, study, [*filter(None, codes.values())], inputs, facts)
+    asked = {
+        **{"version": __version__, "physics": PHYSICS, "module": module, "options": options},
+        **{"plugin": plugin, "arch": arch, "inputs": copies},
+        "settings": settings_of(study.points, study.seeds) | getattr(plan, "facts", dict)(),
+        **{"points": study.keys, "seeds": study.seeds, "arrays": study.arrays},
+        **{"seconds": study.seconds[:, 0], "families": study.families},
+    }
+    asked = json.loads(files.to_json(asked))
+    return Planned(loaded, plan, study, [*filter(None, codes.values())], inputs, asked)
 
 
 @contextmanager
@@ -137,7 +133,7 @@ def opened(path: Path) -> Iterator[Planned]:
                 f"version {asked['version']}, physics {asked['physics']}; use that version, or run "
                 "the command of the folder again."
             )
-        yield replace(again, facts={name: asked[name] for name in again.facts})
+        yield replace(again, asked={**asked, "version": __version__})
 
 
 def run_study(settings: Namespace, planned: Planned, report: bool = True) -> bool:
@@ -154,26 +150,31 @@ def run_study(settings: Namespace, planned: Planned, report: bool = True) -> boo
     figures, parquet = not settings.no_figures, getattr(settings, "parquet", False)
     if parquet:
         imported("Parquet", "pyarrow", "parquet")
-    asked, study = planned.asked(), planned.study
-    is_shown = not settings.force and folder.is_finished(out, asked, figures, parquet)
+    asked, study = planned.asked, planned.study
+    before = folder.json_in(out / MANIFEST) or {}
+    is_shown = (
+        not settings.force
+        and folder.is_finished(out, asked, before)
+        and (before["figures"] or not figures)
+        and (before["parquet"] or not parquet)
+    )
     if not is_shown:
         folder.ask(out, asked, planned.inputs, settings.force)
-        manifest = folder.json_in(out / MANIFEST) or {}
-        figures |= manifest.get("figures", False)
-        parquet |= manifest.get("parquet", False)
+        figures |= before.get("figures", False)
+        parquet |= before.get("parquet", False)
     is_finished = is_shown
     while not is_finished:
         store = Store(out)
         for path in store.damaged:
             notice(f"{files.named(path)} is damaged, so its runs are computed again.")
         if study.missing(store).any():
-            title = Path(planned.facts["module"].rpartition(".")[2]).stem
+            title = planned.module.__name__.rpartition(".")[2].removeprefix("plugin_")
             with (
                 folder.session(out, shard),
                 executor_of(settings) as (executor, threads),
                 progress_bar(title) as progress,
             ):
-                how: dict[str, Any] = {"threads": threads, "arch": planned.facts["arch"]}
+                how: dict[str, Any] = {"threads": threads, "arch": asked["arch"]}
                 run(study, store, executor, shard, progress, planned.code, **how)
             store.refresh()
         if study.missing(store).any():
@@ -210,7 +211,7 @@ def write_tables(
     made = provenance(sys.argv) | {"seconds": seconds}
     with files.writing(out), files.unfinished(out / "tables") as ready:
         ready.mkdir()
-        arch = planned.facts["arch"]
+        arch = planned.asked["arch"]
         results = Results(planned.study, ready, store, made, figures, parquet, part, arch)
         files.write_text(ready / REPORT, planned.module.tables(planned.plan, results))
         made |= {"figures": any(ready.rglob("*.png")), "parquet": parquet}

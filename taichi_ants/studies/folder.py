@@ -28,11 +28,11 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError, count, shown
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.settings import flat
 from taichi_ants.studies.provenance import provenance
 from taichi_ants.studies.store import BLOCKS, Arrays, Store
-from taichi_ants.studies.study import FailedBlocksError, Study, share_of
+from taichi_ants.studies.study import FailedBlocksError, Study
 
 STUDY, MANIFEST, REPORT, PAGE = "study.json", "manifest.json", "report.txt", "report.html"
 INPUTS, SESSIONS = "inputs", "sessions"
@@ -177,19 +177,27 @@ def sessions_in(folder: Path) -> list[dict[str, Any]]:
     return sorted(sessions, key=lambda facts: facts["began"])
 
 
-def is_finished(folder: Path, asked: Mapping[str, Any], figures: bool, parquet: bool) -> bool:
-    """Return whether a folder has all tables that were asked for, and they are unchanged."""
-    manifest = json_in(folder / MANIFEST)
-    return bool(
-        manifest
-        and manifest.get("study") == files.checksum_of_json(asked)
-        and (manifest["figures"] or not figures)
-        and (manifest["parquet"] or not parquet)
-        and all(
-            (folder / name).is_file() and checksum_of(folder / name) == checksum
-            for name, checksum in manifest["files"].items()
-        )
+def is_finished(folder: Path, asked: Mapping[str, Any], manifest: Mapping[str, Any]) -> bool:
+    """Return whether a folder has all files of a manifest, unchanged, as they were asked for."""
+    return manifest.get("study") == files.checksum_of_json(asked) and all(
+        (folder / name).is_file() and checksum_of(folder / name) == checksum
+        for name, checksum in manifest["files"].items()
     )
+
+
+def finished(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a folder of finished results, none of whose files has changed.
+
+    Raises:
+        AntsError: The results are not finished, or a file is missing or has changed.
+    """
+    asked, manifest = asked_in(folder), json_in(folder / MANIFEST) or {}
+    if not is_finished(folder, asked, manifest):
+        raise AntsError(
+            f"{files.named(folder)} has no finished results, or some of them have changed; run the "
+            "command of this folder again, which writes what is missing."
+        )
+    return manifest
 
 
 def publish(folder: Path, ready: Path, made: Mapping[str, Any] | None) -> None:
@@ -218,41 +226,3 @@ def checksum_of(path: Path) -> str:
     """Return the hexadecimal SHA-256 of a file."""
     with files.opened(path) as file:
         return hashlib.sha256(file.read()).hexdigest()
-
-
-def status(folder: Path) -> Iterator[str]:
-    """Yield lines about a folder of results.
-
-    Raises:
-        AntsError: The folder has no study, or its description is damaged.
-    """
-    asked, store, sessions = asked_in(folder), Store(folder), sessions_in(folder)
-    numbers, blocks = store.where(asked["points"], asked["seeds"], asked["arrays"])
-    done, manifest = numbers >= 0, json_in(folder / MANIFEST)
-    if done.all() and manifest and manifest.get("study") == files.checksum_of_json(asked):
-        yield f"finished: results with {count(done.size, 'run')}, since {manifest['finished']}"
-        return
-    seconds = np.broadcast_to(np.array(asked["seconds"])[:, None], done.shape)
-    share = 100 * seconds[done].sum() / seconds.sum()
-    yield (
-        f"unfinished: {done.sum()} of {count(done.size, 'run')} done ({share:.0f} % of the work), "
-        f"in {count(len(np.unique(numbers[done])), 'block')}"
-    )
-    for number, shards in sorted({tuple(facts["shard"]) for facts in sessions} - {(1, 1)}):
-        mine = share_of(seconds, asked["families"], number, shards)
-        yield f"shard {number} of {shards}: {done[mine].sum()} of {count(mine.sum(), 'run')} done"
-    times = np.array([block.path.stat().st_mtime for block in blocks])
-    new = done & (times[numbers] > sessions[-1]["began"]) if sessions and blocks else done & False
-    if new.any() and not done.all():
-        speed = seconds[new].sum() / (times.max() - sessions[-1]["began"])
-        yield f"left: about {_duration(seconds[~done].sum() / speed)}"
-    yield from (f"failed: {block}" for block in (sessions[-1]["failed"] if sessions else ()))
-    if blocks:
-        yield f"last block: {_duration(max(0.0, time.time() - times.max()))} ago"
-
-
-def _duration(seconds: float) -> str:
-    for size, unit in ((86400, "day"), (3600, "hour"), (60, "minute")):
-        if seconds >= 2 * size:
-            return count(round(seconds / size), unit)
-    return count(round(seconds), "second")

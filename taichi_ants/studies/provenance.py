@@ -5,22 +5,21 @@ from __future__ import annotations
 import datetime
 import os
 import platform
+import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from packaging.requirements import Requirement
-from packaging.utils import canonicalize_name
-
 from taichi_ants import __version__
 
 # Packages that results depend on, if this package runs without being installed.
-_DIRECT = ("taichi", "numpy", "scipy", "matplotlib")
+_DIRECT = "taichi", "numpy", "scipy", "matplotlib"
+_EXTRAS = "pyarrow", "SALib", "ray"  # that studies use
 
 
 def provenance(arguments: Sequence[str]) -> dict[str, Any]:
@@ -59,23 +58,20 @@ def source() -> dict[str, Any]:
     return {"commit": None, "clean": None}
 
 
-def packages() -> dict[str, str]:
+def packages(also: Iterable[str] = ()) -> dict[str, str]:
     """Return the versions of this package and of those that it depends on, also indirectly.
 
-    Includes packages of extras if this process has imported them.
+    Includes extras that this process has imported, and installed packages in `also`.
     """
-    imported = {canonicalize_name(name) for name in sys.modules if "." not in name}
-    versions, waiting = dict[str, str](), ["taichi-ants", *_DIRECT]
+    versions = dict[str, str]()
+    waiting = ["taichi-ants", *_DIRECT, *(name for name in _EXTRAS if name in sys.modules), *also]
     for name in waiting:  # which grows
         with suppress(metadata.PackageNotFoundError):
-            if name in versions:
-                continue
-            versions[name] = metadata.version(name)
-            for needed in map(Requirement, metadata.requires(name) or ()):
-                other = canonicalize_name(needed.name)
-                is_always = needed.marker is None or needed.marker.evaluate({"extra": ""})
-                if is_always or (name == "taichi-ants" and other in imported):
-                    waiting.append(other)
+            if name not in versions:
+                versions[name] = metadata.version(name)
+                needed = (line for line in metadata.requires(name) or () if "extra ==" not in line)
+                names = (re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in needed)
+                waiting += [re.sub(r"[-_.]+", "-", name).lower() for name in names]
     versions.pop("taichi-ants", None)
     return {"taichi_ants": __version__, **dict(sorted(versions.items()))}
 

@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 from command_lines import assert_one_sentence, assert_same_results, call, contents, promptly, start
 
-from taichi_ants.studies.folder import sessions_in, status, write_json
+from taichi_ants.commands.status import status
+from taichi_ants.studies.folder import sessions_in, write_json
 from taichi_ants.studies.points import ColonyPoint, RunPoint
 
 RUNS = """
