@@ -305,7 +305,7 @@ MUTATIONS = [
     ("studies/points.py", "= declared.checked(settings[declared.name])", "= 0.5", STUDIES),
     ("studies/executors.py", "if deaths[piece] < TRIES:", "if False:", EXECUTORS),
     ("studies/executors.py", "if of_study != versions():", "if False:", EXECUTORS),
-    ("studies/executors.py", "while len(coming) < 2 * workers:", "while True:", EXECUTORS),
+    ("studies/executors.py", " and len(coming) < 2 * workers:", ":", EXECUTORS),
     ("studies/ray.py", "            _check_listens(address)", "            pass", RAY),
     ("studies/folder.py", 'runs in ("points", "seeds")):', 'runs in ("points",)):', GROWING),
     ("studies/folder.py", "if before and not force:", "if False:", GROWING),

@@ -81,7 +81,10 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
         return wanted
     if running is not None:
         ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
-        if not ours or holds_data():
+        data = ti.Field, ti.Ndarray, ti.Texture  # which only the user's program creates
+        # There are half a million objects, but only a few thousand types.
+        kinds = {type(thing) for thing in gc.get_objects()}
+        if not ours or any(issubclass(kind, data) for kind in kinds):
             why = "has fields or arrays" if ours else "was not started by taichi_ants"
             raise AntsError(
                 f"arch={wanted.arch!r}, threads={wanted.threads} requires a restart of Taichi, but "
@@ -103,26 +106,6 @@ def start_with_checks() -> None:
     import taichi as ti
 
     _init(ti, Runtime("cpu", 1), debug=True, offline_cache=False)
-
-
-def holds_data() -> bool:
-    """Return whether Taichi has fields or arrays, which only the user's program creates."""
-    import taichi as ti
-
-    runtime, root = ti.lang.impl.get_runtime(), ti.lang.impl._root_fb
-    if runtime.prog is None:
-        return False
-    trees = range(runtime.prog.get_snode_tree_size())
-    return bool(
-        any(runtime.prog.get_snode_root(tree).get_num_ch() for tree in trees)
-        or runtime.global_vars  # fields that are declared but not placed
-        or not root.empty
-        or len(runtime.unfinalized_fields_builder) > 1  # one is the root
-        # There are half a million objects, but only a few thousand types.
-        or any(
-            issubclass(cls, (ti.Ndarray, ti.Texture)) for cls in set(map(type, gc.get_objects()))
-        )
-    )
 
 
 @contextlib.contextmanager

@@ -64,17 +64,17 @@ def run(settings: argparse.Namespace) -> None:
         there = {"Python": manifest["python"], **manifest["packages"]}
         here = {"Python": platform.python_version(), **packages(there)}
         if differ := [name for name, version in there.items() if here.get(name) != version]:
-            words = (f"{n} {here.get(n, 'is missing')} instead of {there[n]}" for n in differ)
+            others = (f"{n} {here.get(n, 'is missing')} instead of {there[n]}" for n in differ)
             command_line.notice(
-                f"These versions differ from those of the archive: {', '.join(words)}."
+                f"These versions differ from those of the archive: {', '.join(others)}."
             )
         with opened(folder) as planned:
             more = {"no_figures": not manifest["figures"], "parquet": manifest["parquet"]}
             more |= {"out": out, "force": False, "arch": planned.asked["arch"]}
             if not run_study(argparse.Namespace(**vars(settings) | more), planned, report=False):
                 return
-        names = {*manifest["files"], *finished(out)["files"]}
-        different = {name: _difference(name, folder, out) for name in sorted(names)}
+        every = sorted({*manifest["files"], *finished(out)["files"]})
+        different = {name: _difference(name, folder, out) for name in every}
     for name, words in different.items():
         print(f"DIFFERENT  {name} ({words})" if words else f"equal      {name}")
     if number := sum(map(bool, different.values())):

@@ -57,7 +57,7 @@ def status(folder: Path) -> Iterator[str]:
         mine = share_of(seconds, asked["families"], number, shards)
         yield f"shard {number} of {shards}: {done[mine].sum()} of {count(mine.sum(), 'run')} done"
     times = np.array([block.path.stat().st_mtime for block in blocks] or [0.0])
-    last = sessions[-1] if sessions else {"began": math.inf, "failed": ()}
+    last = [{"began": math.inf, "failed": []}, *sessions][-1]
     new = done & (times[numbers] > last["began"])
     if new.any() and not done.all():
         speed = seconds[new].sum() / (times.max() - last["began"])

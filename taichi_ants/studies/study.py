@@ -209,7 +209,7 @@ def run(
         later = stages[number + 1 :]
         left = stage.seconds[wanted].sum() + sum(s.seconds[r].sum() for s, r in later)
         for block, outcome in completed(list(stage.blocks(wanted)), work, executor, code):
-            if isinstance(outcome, Exception):
+            if isinstance(outcome, BaseException):
                 text = " ".join(str(outcome).split()).rstrip(".")
                 kind = "" if isinstance(outcome, AntsError) else f"{type(outcome).__name__}: "
                 failed.append(f"{stage.named(block)} ({kind}{text})")
