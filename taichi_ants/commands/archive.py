@@ -51,7 +51,6 @@ def run(settings: argparse.Namespace) -> None:
     manifest = finished(folder)
     if out.exists() and not settings.force:
         raise AntsError(f"{str(out)!r} exists; choose another --out, or give --force.")
-    files.check_writable_folder(out.parent, out)
     texts = {"ODD.md": odd_of(folder, manifest), "requirements.txt": _requirements(manifest)}
     texts["README.md"] = _README.format(**manifest)
     contents = {name: text.encode() for name, text in texts.items()}

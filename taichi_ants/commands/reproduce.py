@@ -21,8 +21,7 @@ from taichi_ants.commands.archive import RESULTS
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command import opened, run_study
-from taichi_ants.studies.folder import INPUTS, MANIFEST, PAGE, finished
-from taichi_ants.studies.provenance import packages
+from taichi_ants.studies.folder import INPUTS, MANIFEST, PAGE, finished, packages
 
 STOPPED = command_line.AGAIN
 MOST_BYTES = 1 << 34  # of all unpacked files

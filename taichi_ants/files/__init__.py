@@ -39,11 +39,13 @@ PathLike = str | os.PathLike[str]
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> None:
     """Write a file so that readers see either the old content or the complete new content.
 
-    Replaces an existing file and follows symbolic links. Calls `writer` with a binary file and lets
-    its exceptions pass through.
+    Replaces an existing file, follows symbolic links, and creates missing folders. Calls `writer`
+    with a binary file and lets its exceptions pass through.
     """
     with writing(path):
         target = _target_of(path)
+        if not target.parent.exists():
+            target.parent.mkdir(parents=True)
         with unfinished(target) as temporary:
             with open(temporary, "wb") as file:
                 writer(file)
@@ -68,15 +70,11 @@ def unfinished(target: Path) -> Iterator[Path]:
 def check_writable_file(path: PathLike) -> Path:
     """Return the path, after a check that `write_atomically` can write it, before long work.
 
-    Creates nothing. The folder may be missing if it can be created, unless the path is a link.
-    Raises AntsError also for folders, devices and pipes.
+    Creates nothing. Raises AntsError also for folders, devices and pipes.
     """
     with writing(path):
         target = _target_of(path)
-        folder = target.parent
-        if not os.path.islink(path):
-            folder = next(parent for parent in target.parents if parent.exists())
-        _try_to_write(folder)
+        _try_to_write(next(parent for parent in target.parents if parent.exists()))
     return Path(path)
 
 
@@ -169,13 +167,10 @@ def small(array: np.ndarray) -> np.ndarray:
     return array.astype(np.min_scalar_type(min(low, -1 - high)))
 
 
-def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Path:
-    """Return the path of a writable folder, which is created if it is missing.
-
-    Messages name `chosen`, for example the parent folder that the user chose, instead of the path.
-    """
+def check_writable_folder(path: PathLike) -> Path:
+    """Return the path of a writable folder, which is created if it is missing."""
     folder = Path(path)
-    with writing(chosen or path):
+    with writing(path):
         folder.mkdir(parents=True, exist_ok=True)
         _try_to_write(folder)
     return folder

@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import re
 import sys
 import time
 from argparse import Namespace
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -32,10 +33,9 @@ from taichi_ants.runtime import available_threads
 from taichi_ants.studies import folder
 from taichi_ants.studies.command_line import notice, progress_bar
 from taichi_ants.studies.executors import Workers
-from taichi_ants.studies.folder import INPUTS, MANIFEST, PAGE, REPORT, Results
+from taichi_ants.studies.folder import INPUTS, MANIFEST, PAGE, REPORT, Results, provenance
 from taichi_ants.studies.plugins import Code, checksum_of, load_plugin, placed, read_plugin
 from taichi_ants.studies.points import settings_of
-from taichi_ants.studies.provenance import provenance
 from taichi_ants.studies.store import DamagedError, Store
 from taichi_ants.studies.study import Study, run
 
@@ -214,8 +214,22 @@ def write_tables(
         arch = planned.asked["arch"]
         results = Results(planned.study, ready, store, made, figures, parquet, part, arch)
         files.write_text(ready / REPORT, planned.module.tables(planned.plan, results))
-        made |= {"figures": any(ready.rglob("*.png")), "parquet": parquet}
-        folder.publish(out, ready, None if part else made)
+        paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
+        checksums = {path.as_posix(): folder.checksum_of(ready / path) for path in paths}
+        with suppress(AntsError):  # a damaged manifest is replaced
+            for name in (folder.json_in(out / MANIFEST) or {"files": ()})["files"]:
+                is_inside = (out / name).resolve().is_relative_to(out.resolve())
+                if name not in checksums and is_inside:
+                    (out / name).unlink(missing_ok=True)
+        for path in paths:
+            (out / path).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(ready / path, out / path)
+        if part:
+            (out / MANIFEST).unlink(missing_ok=True)
+        else:
+            made |= {"figures": any(path.suffix == ".png" for path in paths), "parquet": parquet}
+            made |= {"study": files.checksum_of_json(folder.asked_in(out)), "files": checksums}
+            folder.write_json(out / MANIFEST, made)
 
 
 @contextmanager

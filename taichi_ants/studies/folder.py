@@ -11,26 +11,31 @@ No process changes the files of another one, so several can work in a folder wit
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import json
 import os
+import platform
+import re
+import shlex
 import socket
+import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
+from importlib import metadata
 from operator import methodcaller
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import files
+from taichi_ants import __version__, files
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.settings import flat
-from taichi_ants.studies.provenance import provenance
 from taichi_ants.studies.store import BLOCKS, Arrays, Store
 from taichi_ants.studies.study import FailedBlocksError, Study
 
@@ -38,6 +43,8 @@ STUDY, MANIFEST, REPORT, PAGE = "study.json", "manifest.json", "report.txt", "re
 INPUTS, SESSIONS = "inputs", "sessions"
 _OF_ALL = (STUDY, INPUTS, BLOCKS, SESSIONS)
 _BESIDE_SETTINGS = "physics", "version", "plugin", "arch"  # what else determines results
+# Packages that results depend on, if this package runs without being installed, and extras.
+_DIRECT, _EXTRAS = ("taichi", "numpy", "scipy", "matplotlib"), ("pyarrow", "SALib", "ray")
 
 
 @dataclass(frozen=True)
@@ -124,9 +131,7 @@ def ask(folder: Path, asked: Mapping[str, Any], inputs: Mapping[str, bytes], for
             f"{files.named(folder)} contains files, but no results; choose another --out, or give "
             "--force to add results to them."
         )
-    files.check_writable_folder(folder)
     for name, content in inputs.items():
-        files.check_writable_folder((folder / name).parent, folder)
         files.write_atomically(folder / name, methodcaller("write", content))
     write_json(folder / STUDY, asked)
 
@@ -152,10 +157,9 @@ def _check_grows(folder: Path, before: Mapping[str, Any], asked: Mapping[str, An
 @contextmanager
 def session(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
     """Return a context in which a file says that this process computes, and then how it ended."""
-    sessions = files.check_writable_folder(folder / SESSIONS, folder)
-    began, name = time.time(), f"{time.strftime('%Y%m%dT%H%M%S')}-{socket.gethostname()}"
+    name = f"{time.strftime('%Y%m%dT%H%M%S')}-{socket.gethostname()}-{os.getpid()}.json"
+    path, began = folder / SESSIONS / name, time.time()
     facts = {**provenance(sys.argv), "shard": shard, "began": began, "seconds": None, "failed": []}
-    path = sessions / f"{name}-{os.getpid()}.json"
     files.write_text(path, files.to_json(facts, indent=1))
     try:
         yield
@@ -200,29 +204,70 @@ def finished(folder: Path) -> dict[str, Any]:
     return manifest
 
 
-def publish(folder: Path, ready: Path, made: Mapping[str, Any] | None) -> None:
-    """Move ready files into a folder of results, and then write the manifest with facts.
-
-    Removes the files that an older manifest lists. None for `made`: the results are unfinished.
-    """
-    paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
-    checksums = {path.as_posix(): checksum_of(ready / path) for path in paths}
-    with suppress(AntsError):  # a damaged manifest is replaced
-        for name in (json_in(folder / MANIFEST) or {"files": ()})["files"]:
-            file = folder / name
-            if name not in checksums and file.resolve().is_relative_to(folder.resolve()):
-                file.unlink(missing_ok=True)
-    for path in paths:
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        os.replace(ready / path, folder / path)
-    if made is None:
-        (folder / MANIFEST).unlink(missing_ok=True)
-    else:
-        study = files.checksum_of_json(asked_in(folder))
-        write_json(folder / MANIFEST, {**made, "study": study, "files": checksums})
-
-
 def checksum_of(path: Path) -> str:
     """Return the hexadecimal SHA-256 of a file."""
     with files.opened(path) as file:
         return hashlib.sha256(file.read()).hexdigest()
+
+
+def provenance(arguments: Sequence[str]) -> dict[str, Any]:
+    """Return the command, time, source, versions and machine, for the manifest of results.
+
+    A command with an absolute path, as an installed one has, is recorded by its name alone.
+    """
+    program, *options = arguments
+    if os.path.isabs(program):
+        program = Path(program).name.replace("__main__.py", "taichi-ants")
+    return {
+        "command": shlex.join((program, *options)),
+        "finished": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
+        **source(),
+        "python": platform.python_version(),
+        "packages": packages(),
+        "platform": platform.platform(),
+        "processor": processor(),
+        "cpus": os.cpu_count(),
+    }
+
+
+def source() -> dict[str, Any]:
+    """Return the `commit` of this package's source, and whether it was `clean`.
+
+    Clean means that no tracked file differed from the commit. Both are None outside of a checkout.
+    """
+    root = Path(__file__).resolve().parents[2]
+    command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty"]
+    how: dict[str, Any] = {"stderr": subprocess.DEVNULL, "text": True, "timeout": 10}
+    with suppress(OSError, subprocess.SubprocessError):
+        if (root / ".git").exists():
+            described = subprocess.check_output(command, cwd=root, **how).strip()
+            commit, _, changed = described.partition("-")
+            return {"commit": commit, "clean": not changed}
+    return {"commit": None, "clean": None}
+
+
+def packages(also: Iterable[str] = ()) -> dict[str, str]:
+    """Return the versions of this package and of those that it depends on, also indirectly.
+
+    Includes extras that this process has imported, and installed packages in `also`.
+    """
+    versions = dict[str, str]()
+    waiting = ["taichi-ants", *_DIRECT, *(name for name in _EXTRAS if name in sys.modules), *also]
+    for name in waiting:  # which grows
+        with suppress(metadata.PackageNotFoundError):
+            if name not in versions:
+                versions[name] = metadata.version(name)
+                needed = (line for line in metadata.requires(name) or () if "extra ==" not in line)
+                names = (re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in needed)
+                waiting += [re.sub(r"[-_.]+", "-", name).lower() for name in names]
+    versions.pop("taichi-ants", None)
+    return {"taichi_ants": __version__, **dict(sorted(versions.items()))}
+
+
+def processor() -> str:
+    """Return the name of the processor, or of its architecture if the name is unknown."""
+    with suppress(OSError, StopIteration):
+        lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
+        line = next(line for line in lines if line.startswith("model name"))
+        return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

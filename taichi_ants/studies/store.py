@@ -97,8 +97,6 @@ class Store:
         header = json.dumps([list(points), list(seeds), list(arrays)])
         path = self.folder / f"{hashlib.sha256(header.encode()).hexdigest()[:32]}.npz"
         content: dict[str, Any] = {_ABOUT: np.array(header), **arrays}
-        with files.writing(self.folder):
-            self.folder.mkdir(parents=True, exist_ok=True)
         files.write_atomically(path, lambda file: np.savez(file, **content))
         self._blocks[path.name] = Stored(path, tuple(points), tuple(seeds), tuple(arrays))
 
