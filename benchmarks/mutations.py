@@ -394,7 +394,7 @@ MUTATIONS = [
     ("commands/reproduce.py", "> MOST_BYTES:", "> 2 * MOST_BYTES:", ARCHIVE),
     ("commands/reproduce.py", "sum(map(bool, diff", "0 * sum(map(bool, diff", ARCHIVE),
     ("commands/reproduce.py", "if not settings.trust_code:", "if False:", ARCHIVE),
-    ("files/inputs.py", "return copy or path", "return path", ARCHIVE),
+    ("files/__init__.py", "return copy or path", "return path", ARCHIVE),
     ("report/odd.py", 'return row.get(f"{group}.{other}") in needed', "return True", ODD),
     ("report/odd.py", "value[n] if name in varies", "value[0] if name in varies", ODD),
     ("report/odd.py", 'and not row["episodes"]', "and False", ODD),

@@ -1,7 +1,8 @@
 """Atomic writing of files, and reading with limits on their size.
 
 All functions raise an AntsError that names the file if it cannot be written or read. `archives`
-stores arrays with metadata (.npz), and `tables` writes typed columns.
+stores arrays with metadata (.npz), and `tables` writes typed columns. A study records the files
+that it reads, so that it can be planned again from copies.
 """
 
 from __future__ import annotations
@@ -26,7 +27,6 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from taichi_ants.errors import AntsError, expect, shown
-from taichi_ants.files import inputs
 
 if sys.version_info >= (3, 11):
     import tomllib as tomllib
@@ -34,6 +34,8 @@ else:
     import tomli as tomllib  # noqa: F401
 
 PathLike = str | os.PathLike[str]
+_record: dict[str, bytes] | None = None  # of the files that a study reads before it starts
+_copies: Mapping[str, Path] | None = None  # that are read in place of other files
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> None:
@@ -45,7 +47,7 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> No
     with writing(path):
         target = _target_of(path)
         if not target.parent.exists():
-            target.parent.mkdir(parents=True)
+            target.parent.mkdir(parents=True, exist_ok=True)
         with unfinished(target) as temporary:
             with open(temporary, "wb") as file:
                 writer(file)
@@ -130,14 +132,16 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
     try:
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         no_wait = getattr(os, "O_NONBLOCK", 0)
-        copy = inputs.place_of(path)
+        copy = place_of(path)
         with open(copy, "rb", opener=lambda name, flags: os.open(name, flags | no_wait)) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise OSError("it is a device or a pipe")
             if status.st_size > most:
                 raise OSError(f"it has {status.st_size} bytes, and at most {most} are allowed")
-            inputs.note(path, file)
+            if _record is not None:
+                _record[os.fspath(path)] = file.read()
+                file.seek(0)
             yield file
     except AntsError:
         raise
@@ -145,6 +149,42 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
         raise AntsError(
             f"cannot read {named(path)}: {_reason(error)}; name another file."
         ) from error
+
+
+@contextmanager
+def recorded() -> Iterator[dict[str, bytes]]:
+    """Yield a mapping that gets the content of each file that this package reads, by its path."""
+    global _record
+    before, _record = _record, {}
+    try:
+        yield _record
+    finally:
+        _record = before
+
+
+@contextmanager
+def replaced(copies: Mapping[str, Path]) -> Iterator[None]:
+    """Return a context in which this package reads copies instead of the files of these paths.
+
+    Other files cannot be read while `recorded` records them.
+    """
+    global _copies
+    before, _copies = _copies, copies
+    try:
+        yield
+    finally:
+        _copies = before
+
+
+def place_of(path: PathLike) -> PathLike:
+    """Return the copy to read instead of a file, or its path; AntsError if it cannot be read."""
+    copy = (_copies or {}).get(os.fspath(path))
+    if copy is None and _copies is not None and _record is not None:
+        raise AntsError(
+            f"the study reads {named(path)}, which its archive does not contain; get another copy "
+            "of the archive."
+        )
+    return copy or path
 
 
 def read_text(path: PathLike, most: int = 1 << 26) -> str:

@@ -28,7 +28,6 @@ from typing import Any
 
 from taichi_ants import PHYSICS, __version__, files
 from taichi_ants.errors import AntsError, imported
-from taichi_ants.files.inputs import recorded, replaced
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies import folder
 from taichi_ants.studies.command_line import notice, progress_bar
@@ -76,7 +75,7 @@ def planned(module: str, settings: Namespace) -> Planned:
     options = json.loads(files.to_json(options))
     plugin, arch, file = settings.plugin, settings.arch, module if module[-3:] == ".py" else None
     codes = {"plugin": read_plugin(plugin), "study": read_plugin(file)}
-    with recorded() as read:
+    with files.recorded() as read:
         load_plugin(plugin, codes["plugin"])
         loaded: Any = load_plugin(file, codes["study"]) or import_module(module)
         plan = loaded.plan(options)
@@ -125,7 +124,7 @@ def opened(path: Path) -> Iterator[Planned]:
     if module.endswith(".py"):
         module = str(path / INPUTS / "study" / Path(module).name)
     settings = Namespace(**asked["options"], plugin=plugin, arch=asked["arch"])
-    with replaced({name: path / copy for name, copy in asked["inputs"].items()}):
+    with files.replaced({name: path / copy for name, copy in asked["inputs"].items()}):
         again = planned(module, settings)
         if list(again.study.keys) != asked["points"]:
             raise AntsError(
