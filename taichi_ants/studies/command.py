@@ -12,10 +12,8 @@ without raising its `VERSION` has that number; otherwise its text is a part of t
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
-import re
 import sys
 import time
 from argparse import Namespace
@@ -39,10 +37,8 @@ from taichi_ants.studies.store import DamagedError, Store
 from taichi_ants.studies.study import Study, run
 
 # Options of all studies, which `plan` does not get.
-_OF_ALL = (
-    *("out", "force", "no_figures", "parquet", "plugin"),
-    *("arch", "threads", "workers", "ray", "shard"),
-)
+_OF_ALL = {"out", "force", "no_figures", "parquet", "plugin"}
+_OF_ALL |= {"arch", "threads", "workers", "ray", "shard"}
 
 
 @dataclass(frozen=True)
@@ -68,8 +64,7 @@ class Planned:
 def planned(module: str, settings: Namespace) -> Planned:
     """Return the study of a module, a name or the path of a file, for the settings of a command.
 
-    Raises:
-        AntsError: A file cannot be read or run, or an option is not allowed.
+    Raises an AntsError if a file cannot be read or run, or an option is not allowed.
     """
     options = {name: value for name, value in vars(settings).items() if name not in _OF_ALL}
     options = json.loads(files.to_json(options))
@@ -95,9 +90,10 @@ def planned(module: str, settings: Namespace) -> Planned:
     }
     copies = dict[str, str]()
     for path, content in read.items():
-        base = re.sub(r"[^\w.-]", "_", Path(path).name)
-        names = (f"{INPUTS}/{f'{n}-' if n > 1 else ''}{base}" for n in itertools.count(1))
-        copies[path] = next(name for name in names if name not in inputs)
+        copy = Path(INPUTS, Path(path).name)
+        while copy.as_posix() in inputs:
+            copy = copy.with_name(f"2-{copy.name}")
+        copies[path] = copy.as_posix()
         inputs[copies[path]] = content
     asked = {
         **{"version": __version__, "physics": PHYSICS, "module": module, "options": options},
@@ -112,11 +108,7 @@ def planned(module: str, settings: Namespace) -> Planned:
 
 @contextmanager
 def opened(path: Path) -> Iterator[Planned]:
-    """Yield the study of a folder of results, planned from the files in the folder.
-
-    Raises:
-        AntsError: The folder has no study, or its study cannot be planned.
-    """
+    """Yield the study of a folder of results, planned from its files; AntsError if it has none."""
     asked = folder.asked_in(path)
     plugin, module = asked["plugin"], asked["module"]
     if plugin:
@@ -201,17 +193,16 @@ def run_study(settings: Namespace, planned: Planned, report: bool = True) -> boo
 def write_tables(
     out: Path, planned: Planned, store: Store, figures: bool, parquet: bool, part: bool = False
 ) -> None:
-    """Write the tables of a study; with `part`, runs can be missing, and results are unfinished.
+    """Write the tables of a study; DamagedError if a block cannot be read.
 
-    Raises:
-        DamagedError: A block cannot be read; its runs are missing now.
+    With `part`, runs can be missing, and the results are unfinished.
     """
     seconds = sum(session["seconds"] or 0.0 for session in folder.sessions_in(out))
     made = provenance(sys.argv) | {"seconds": seconds}
     with files.writing(out), files.unfinished(out / "tables") as ready:
         ready.mkdir()
-        arch = planned.asked["arch"]
-        results = Results(planned.study, ready, store, made, figures, parquet, part, arch)
+        how = figures, parquet, part, planned.asked["arch"]
+        results = Results(planned.study, ready, store, made, *how)
         files.write_text(ready / REPORT, planned.module.tables(planned.plan, results))
         paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
         checksums = {path.as_posix(): folder.checksum_of(ready / path) for path in paths}

@@ -148,6 +148,8 @@ class Workers(Executor):
         self._calls: list[set[Future[Any]]] = [set() for _ in range(workers)]
         # The workers have one end. They see that the other one is closed, also by a crash.
         self._end, self._line = multiprocessing.Pipe(duplex=False)
+        # Taichi cannot be forked.
+        self._start = multiprocessing.get_context("spawn"), _end_with, (self._end,)
 
     def submit(self, call: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
         """Return the future of a call in the worker that has the fewest calls."""
@@ -157,7 +159,7 @@ class Workers(Executor):
         with _without_ctrl_c():
             for _ in range(TRIES):
                 with suppress(BrokenExecutor):
-                    pool = self._pools[n] = self._pools[n] or _pool(self._end)
+                    pool = self._pools[n] = self._pools[n] or ProcessPoolExecutor(1, *self._start)
                     future = pool.submit(call, *given, **named)
                     self._calls[n].add(future)
                     return future
@@ -177,11 +179,6 @@ class Workers(Executor):
         self._line.close()
         self._end.close()
         self.shutdown(wait=False, cancel_futures=True)
-
-
-def _pool(end: Connection) -> ProcessPoolExecutor:
-    """Return a pool of one process; Taichi cannot be forked."""
-    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _end_with, (end,))
 
 
 @contextmanager

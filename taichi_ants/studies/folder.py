@@ -24,7 +24,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from importlib import metadata
 from operator import methodcaller
@@ -61,11 +61,11 @@ class Results:
     study: Study
     folder: Path
     store: Store
-    made: Mapping[str, Any] = field(default_factory=dict)
-    figures: bool = True
-    parquet: bool = False
-    part: bool = False
-    arch: str = "cpu"
+    made: Mapping[str, Any]
+    figures: bool
+    parquet: bool
+    part: bool
+    arch: str
 
     @property
     def read(self) -> Callable[..., Arrays]:
@@ -87,11 +87,7 @@ def asked_in(folder: Path) -> dict[str, Any]:
 
 
 def json_in(path: Path) -> dict[str, Any] | None:
-    """Return the facts in a file that `write_json` wrote; None if it is missing.
-
-    Raises:
-        AntsError: The file is damaged.
-    """
+    """Return the facts in a file of `write_json`; None if it is missing, AntsError if damaged."""
     if not path.exists():
         return None
     try:
@@ -115,22 +111,20 @@ def write_json(path: Path, facts: Mapping[str, Any]) -> None:
 def ask(folder: Path, asked: Mapping[str, Any], inputs: Mapping[str, bytes], force: bool) -> None:
     """Write down what a study asks for, and copies of the files that it has read.
 
-    `inputs` are their contents by their paths in the folder. With `force`, the study can lack what
-    the folder has.
-
-    Raises:
-        AntsError: The folder has other files, or points or seeds that the study lacks.
+    `inputs` are their contents by their paths in the folder. Raises an AntsError, except with
+    `force`, if the folder has other files, or points or seeds that the study lacks.
     """
     before = json_in(folder / STUDY)
     if before == asked:
         return
-    if before and not force:
-        _check_grows(folder, before, asked)
-    elif not force and folder.is_dir() and any(p.name not in _OF_ALL for p in folder.glob("[!.]*")):
+    has_others = folder.is_dir() and any(p.name not in _OF_ALL for p in folder.glob("[!.]*"))
+    if before is None and has_others and not force:
         raise AntsError(
             f"{files.named(folder)} contains files, but no results; choose another --out, or give "
             "--force to add results to them."
         )
+    if before and not force:
+        _check_grows(folder, before, asked)
     for name, content in inputs.items():
         files.write_atomically(folder / name, methodcaller("write", content))
     write_json(folder / STUDY, asked)
@@ -190,11 +184,7 @@ def is_finished(folder: Path, asked: Mapping[str, Any], manifest: Mapping[str, A
 
 
 def finished(folder: Path) -> dict[str, Any]:
-    """Return the manifest of a folder of finished results, none of whose files has changed.
-
-    Raises:
-        AntsError: The results are not finished, or a file is missing or has changed.
-    """
+    """Return the manifest of a folder; AntsError unless all its files are there, unchanged."""
     asked, manifest = asked_in(folder), json_in(folder / MANIFEST) or {}
     if not is_finished(folder, asked, manifest):
         raise AntsError(
