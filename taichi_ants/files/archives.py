@@ -42,19 +42,11 @@ def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: b
     files.write_atomically(path, save)
 
 
-def read(
-    path: files.PathLike,
-    content: bytes | None = None,
-    most: int = MOST_BYTES,
-    foreign: bool = False,
-) -> Arrays:
+def read(path: files.PathLike, content: bytes | None = None, most: int = MOST_BYTES) -> Arrays:
     """Return all arrays of an .npz file, without executing anything in it.
 
-    Args:
-        path: The file, or its name in messages if `content` is given.
-        content: The bytes of the file.
-        most: The largest number of bytes of the file, and of its unpacked arrays.
-        foreign: Whether to accept a file without a checksum, from other software.
+    With `content`, the bytes of the file, `path` is its name in messages. `most` limits the bytes
+    of the file, and of its unpacked arrays. Files of other software have no checksum.
     """
     source = files.opened(path, most) if content is None else nullcontext(io.BytesIO(content))
     name = files.named(path)
@@ -73,8 +65,8 @@ def read(
                     raise ValueError("it is not an archive that NumPy wrote")
                 arrays = dict(archive)  # zipfile checks their CRC-32
             written = arrays.pop(_CHECKSUM, None)
-            if not (foreign if written is None else str(written) == _checksum(arrays)):
-                raise ValueError("the checksum is missing or differs")
+            if written is not None and str(written) != _checksum(arrays):
+                raise ValueError("the checksum differs")
             return arrays
         except (AntsError, OSError, MemoryError):
             raise
@@ -102,14 +94,13 @@ class Kind:
         name: The name of the content, for example "colony".
         version: The version of the format; reading refuses all other versions.
         writer: The function that writes such files, for messages.
-        most, foreign: See `read`.
+        most: See `read`.
     """
 
     name: str
     version: int
     writer: str
     most: int = MOST_BYTES
-    foreign: bool = False
 
     def write(
         self,
@@ -127,11 +118,9 @@ class Kind:
         self, path: files.PathLike, content: bytes | None = None
     ) -> Iterator[tuple[Arrays, dict[str, Any]]]:
         """Yield the arrays and facts of a file to a block, whose errors become an AntsError."""
-        arrays = read(path, content, self.most, self.foreign)
+        arrays = read(path, content, self.most)
         try:
-            text = arrays.pop("facts").item()
-            text = text.decode() if isinstance(text, bytes) else text
-            facts = json.loads(text)
+            facts = json.loads(arrays.pop("facts").item())
             kind, version = facts["kind"], facts["version"]
         except (AttributeError, KeyError, ValueError, TypeError, RecursionError):
             kind = version = None

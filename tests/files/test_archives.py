@@ -52,8 +52,6 @@ def test_reading_executes_nothing(tmp_path: Path) -> None:
     np.savez(path, x=np.array([Trap(sprung)], dtype=object))
     with pytest.raises(AntsError, match=r"a\.npz"):
         archives.read(path)
-    with pytest.raises(AntsError, match="damaged, or not"):
-        archives.read(path, foreign=True)
     path.write_bytes(pickle.dumps(Trap(sprung)))
     with pytest.raises(AntsError, match="damaged, or not"):
         archives.read(path)
@@ -82,7 +80,7 @@ def test_what_is_no_archive_is_refused(
     path = tmp_path / "a.npz"
     write(path)
     with pytest.raises(AntsError, match=message) as raised:
-        archives.read(path, foreign=True)
+        archives.read(path)
     assert str(path) in str(raised.value)
 
 
@@ -97,16 +95,8 @@ def test_an_exchanged_array_is_noticed(change: dict, tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", **arrays)
     assert archives.read(tmp_path / "a.npz")["x"].tolist() == [0, 1, 2]
     np.savez(tmp_path / "a.npz", **{**arrays, **change})
-    for foreign in (False, True):
-        with pytest.raises(AntsError, match="damaged"):
-            archives.read(tmp_path / "a.npz", foreign=foreign)
-
-
-def test_only_files_of_ours_are_read_unless_others_are_asked_for(tmp_path: Path) -> None:
-    np.savez(tmp_path / "a.npz", x=1)
-    with pytest.raises(AntsError, match=r"not an \.npz file of this version; write it again"):
+    with pytest.raises(AntsError, match="damaged"):
         archives.read(tmp_path / "a.npz")
-    assert archives.read(tmp_path / "a.npz", foreign=True) == {"x": 1}
 
 
 @pytest.fixture
@@ -138,7 +128,7 @@ def test_an_array_that_is_larger_than_it_declares_is_refused(tmp_path: Path) -> 
     assert content.count((8_000_128).to_bytes(4, "little")) >= 2  # one more with Python 3.10
     path.write_bytes(content.replace((8_000_128).to_bytes(4, "little"), bytes([0, 2, 0, 0])))
     with pytest.raises(AntsError, match="damaged"):
-        archives.read(path, foreign=True)
+        archives.read(path)
 
 
 KIND = archives.Kind("thing", 3, "Thing.save", most=10_000)
