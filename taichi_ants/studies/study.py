@@ -203,23 +203,22 @@ def run(
         progress(1.0 - max(0.0, left - more) / max(total, 1e-9))
 
     show()
-    for number, (stage, runs) in enumerate(stages):
+    for stage, runs in stages:
         work = partial(_work, stage, store, where, None if executor else show)
         wanted = runs & stage.missing(store)  # the stage before has computed some of them
-        later = stages[number + 1 :]
-        left = stage.seconds[wanted].sum() + sum(s.seconds[r].sum() for s, r in later)
+        left -= stage.seconds[runs & ~wanted].sum()
         for block, outcome in completed(list(stage.blocks(wanted)), work, executor, code):
-            if isinstance(outcome, BaseException):
-                text = " ".join(str(outcome).split()).rstrip(".")
-                kind = "" if isinstance(outcome, AntsError) else f"{type(outcome).__name__}: "
-                failed.append(f"{stage.named(block)} ({kind}{text})")
-                if len(failed) == _HOPELESS and not (mine & ~study.missing(store)).any():
-                    break
+            if not isinstance(outcome, BaseException):
+                keys = [stage.keys[p] for p in block.points]
+                store.add(keys, [stage.seeds[s] for s in block.seeds], outcome)
+                left -= stage.seconds[np.ix_(*block)].sum()
+                show()
                 continue
-            keys = [stage.keys[p] for p in block.points]
-            store.add(keys, [stage.seeds[s] for s in block.seeds], outcome)
-            left -= stage.seconds[np.ix_(*block)].sum()
-            show()
+            text = " ".join(str(outcome).split()).rstrip(".")
+            kind = "" if isinstance(outcome, AntsError) else f"{type(outcome).__name__}: "
+            failed.append(f"{stage.named(block)} ({kind}{text})")
+            if len(failed) == _HOPELESS and not (mine & ~study.missing(store)).any():
+                break
         if failed:
             raise FailedBlocksError(failed)
 
