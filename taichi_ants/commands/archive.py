@@ -27,11 +27,7 @@ The results come from this command, which finished {finished}:
     {command}
 
 To compute them again and compare every table and figure, install the versions in `requirements.txt`
-and run `taichi-ants reproduce FILE` with the name of this archive.
-
-- `ODD.md` describes the model of this study by the ODD protocol (Grimm et al. 2020).
-- `results/` has the results, the runs from which they were computed, and in `inputs/` the files
-  that the study has read. `manifest.json` has the settings, the machine and the checksums.
+and run `taichi-ants reproduce FILE` with the name of this archive. `ODD.md` describes the model.
 """
 
 

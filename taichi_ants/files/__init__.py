@@ -70,9 +70,9 @@ def unfinished(target: Path) -> Iterator[Path]:
 
 
 def check_writable_file(path: PathLike) -> Path:
-    """Return the path, after a check that `write_atomically` can write it, before long work.
+    """Return the path of a file that `write_atomically` can write; AntsError before long work.
 
-    Creates nothing. Raises AntsError also for folders, devices and pipes.
+    Creates nothing.
     """
     with writing(path):
         target = _target_of(path)
@@ -97,11 +97,7 @@ def checksum_of_json(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, (np.generic, np.ndarray)):
-        return value.tolist()
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    raise TypeError(f"JSON cannot represent {type(value).__name__}")
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else os.fspath(value)
 
 
 def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
@@ -124,9 +120,9 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
 
 @contextmanager
 def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
-    """Yield a regular file of at most `most` bytes, open for reading.
+    """Yield a regular file of at most `most` bytes, open for reading; AntsError for others.
 
-    Raises AntsError for pipes, which could block forever, and for devices, which have no end.
+    Pipes could block forever, and devices have no end.
     """
     expect("path", path, str, os.PathLike)
     try:
@@ -218,7 +214,7 @@ def check_writable_folder(path: PathLike) -> Path:
 
 @contextmanager
 def writing(path: PathLike) -> Iterator[None]:
-    """Yield once, and turn errors of the operating system into an AntsError with the path."""
+    """Return a context that turns errors of the operating system into an AntsError."""
     try:
         yield
     except AntsError:

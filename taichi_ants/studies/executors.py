@@ -51,17 +51,13 @@ def completed(
 ) -> Iterator[tuple[Piece, Any]]:
     """Yield pieces of work with their outcomes as they come, or with the exception that they raise.
 
-    A piece is tried again if its worker dies, `TRIES` times in all.
+    A piece is tried again if its worker dies, `TRIES` times in all. Raises a LostWorkersError if
+    the executor takes no more work.
 
     Args:
-        pieces: The pieces.
-        work_of: A function that returns the work of a piece, a call that can be pickled. It is
-            called when a worker is about to be free.
+        work_of: A function that returns the work of a piece, a call that can be pickled.
         executor: The executor; None means this process.
         code: The plugins and modules that the workers need.
-
-    Raises:
-        LostWorkersError: The executor takes no more work.
     """
     outcome: Any
     if executor is None:
@@ -119,11 +115,7 @@ def versions() -> str:
 
 
 def run_pickled(of_study: str, code: Sequence[Code], pickled: bytes) -> Any:
-    """Return the outcome of pickled work; this is what workers run.
-
-    Raises:
-        AntsError: The worker has other `versions` than the study.
-    """
+    """Return the outcome of pickled work; AntsError if this worker has other `versions`."""
     if of_study != versions():
         raise AntsError(
             f"the study runs with {of_study}, but a worker has {versions()}; install the same "

@@ -31,16 +31,10 @@ _ENVIRONMENT = {
 class RayWorkers(Executor):
     """Workers that Ray starts, each with `threads` processors, and a GPU for "cuda".
 
-    Ray must not run in this process. It is connected until the `with` block ends. If a worker or
-    its machine dies, Ray repeats the call elsewhere. The workers of a cluster run the source of
-    this package that this process runs.
-
-    Args:
-        address: HOST:PORT of a cluster that this machine belongs to; None starts Ray on this
-            machine alone, and ends it.
-
-    Raises:
-        AntsError: Ray is not installed, or no cluster is at the address.
+    The `address` is HOST:PORT of a cluster that this machine belongs to, whose workers run the
+    source of this package that this process runs. None starts Ray on this machine alone, until the
+    `with` block ends. If a worker or its machine dies, Ray repeats the call elsewhere. Raises an
+    AntsError if Ray is not installed, or no cluster is at the address.
     """
 
     def __init__(self, address: str | None = None, threads: int = 1, arch: str = "cpu") -> None:

@@ -50,8 +50,7 @@ class DamagedError(AntsError):
 class Store:
     """The runs in a folder, which need not exist.
 
-    Attributes:
-        damaged: The files that could not be read, and were renamed to `NAME.damaged`.
+    `damaged` are the files that could not be read, and were renamed to `NAME.damaged`.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -72,10 +71,9 @@ class Store:
     def where(
         self, points: Sequence[str], seeds: Sequence[int], arrays: Sequence[str]
     ) -> tuple[np.ndarray, list[Stored]]:
-        """Return which file has all of these arrays of each run.
+        """Return the index of a file with these arrays for each run, and the files.
 
-        Returns:
-            Indices of files, int64 (points, seeds), -1 for missing runs; and the files.
+        The indices are int64 (points, seeds), and -1 for missing runs.
         """
         rows = {key: n for n, key in enumerate(points)}
         columns = {seed: n for n, seed in enumerate(seeds)}
@@ -102,13 +100,10 @@ class Store:
     def read(
         self, points: Sequence[str], seeds: Sequence[int], arrays: Sequence[str], part: bool = False
     ) -> Arrays:
-        """Return arrays and their parts, (points, seeds, ...).
+        """Return arrays and their parts, (points, seeds, ...); DamagedError if a file is damaged.
 
-        With `part`, runs can be missing: their floats are nan, and other numbers 0.
-
-        Raises:
-            DamagedError: A file cannot be read.
-            KeyError: Runs are missing.
+        With `part`, runs can be missing: their floats are nan, and other numbers 0. Without it, a
+        missing run is a KeyError.
         """
         numbers, blocks = self.where(points, seeds, arrays)
         if (numbers < 0).any() and not part:

@@ -51,8 +51,6 @@ class Study:
     """Points that all run with the same seeds.
 
     Attributes:
-        points: The points.
-        seeds: The seeds.
         arrays: The names of the arrays that are kept of each run: those of the outcome of its
             point, and those that `measure` adds.
         measure: A function at the top level of a module, or a `partial` of one.
@@ -178,15 +176,12 @@ def run(
     code: Sequence[Code] = (),
     **where: Any,
 ) -> None:
-    """Compute and save the runs of a study that a store lacks.
+    """Compute and save the runs of a study that a store lacks, a file for each block.
 
     Args:
-        study: The study.
-        store: The store, which gets a file for each block.
-        executor: See `executors.completed`; None computes in this process.
+        executor, code: See `executors.completed`.
         shard: The number of a shard, from 1, and the number of shards, to compute only its runs.
         progress: A function that is called with the finished share of the work.
-        code: The plugins and modules that workers need.
         where: The arguments `threads` and `arch` of `train`.
 
     Raises:
