@@ -34,10 +34,10 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = command_line.Parser(__doc__)
     add = parser.add_argument
     add("file", type=Path, metavar="FILE", help="archive (.zip)")
-    place = "write the new results here (default: results/reproduced-NAME)"
-    add("--out", type=Path, metavar="FOLDER", help=place)
-    trust = "run the Python code in the archive: plugins, and the module of the study"
-    add("--trust-code", action="store_true", help=trust)
+    about = "write the new results here (default: results/reproduced-NAME)"
+    add("--out", type=Path, metavar="FOLDER", help=about)
+    about = "run the Python code in the archive: plugins, and the module of the study"
+    add("--trust-code", action="store_true", help=about)
     command_line.add_threads(parser)
     command_line.add_machines(parser)
     return parser.parse_args(arguments)
