@@ -35,7 +35,7 @@ def test_a_file_is_written_and_replaced(tmp_path: Path) -> None:
     ("error", "raised", "said"),
     [
         (KeyError("broken"), KeyError, "broken"),
-        (KeyboardInterrupt(), KeyboardInterrupt, ""),
+        (KeyboardInterrupt(), KeyboardInterrupt, "^$"),
         (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), AntsError, "a.bin': no space left"),
     ],
 )
