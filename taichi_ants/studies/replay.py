@@ -78,7 +78,7 @@ def play(folder: Path, number: int, threads: int | None) -> None:
 def _recorded(colony: Colony, point: ColonyPoint, title: str) -> Recording:
     """Return a recording of an episode of a colony, with the protocol of its evaluation."""
     colony.begin_episode(point.ticks)
-    recorder = Recorder(colony, 0, title)
+    recorder = Recorder(colony, title)
     frames = [recorder.snapshot()]
 
     def stepped(colony: Colony, n: int) -> Iterator[None]:
