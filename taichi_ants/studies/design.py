@@ -20,8 +20,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from taichi_ants.analysis.statistics import RANDOM_SEED, all_equal, known_means
-from taichi_ants.analysis.sweeps import short
-from taichi_ants.analysis.tables import Table, interval, number, percent, plain_text
+from taichi_ants.analysis.tables import Table, number, plain_text
 from taichi_ants.errors import AntsError, imported, shown
 from taichi_ants.settings import Flag, Setting, Settings
 
@@ -205,14 +204,7 @@ def seed_share(values: np.ndarray, names: Sequence[str]) -> float:
 
 
 def report(rows: Sequence[Mapping[str, Any]], seeds: int) -> str:
-    """Return rows of indices as a table for a terminal, the largest total index first."""
-    measures, names = ([*dict.fromkeys(row[k] for row in rows)] for k in COLUMNS[:2])
-    lines = []
-    for row in sorted(rows, key=lambda row: (measures.index(row["measure"]), -row["total"])):
-        measure, name, *numbers, share = row.values()
-        groups = numbers[:3], numbers[3:]
-        cells = [f"{number(n, 2)} {interval(low, high, 2)}" for n, low, high in groups]
-        lines.append([measure, short(name, names), *cells, percent(share)])
-    headers = ["measure", "setting", "first order", "total", "share of seeds"]
-    notes = [f"Indices of means over {seeds} seeds, whose share is in each total index."]
-    return plain_text([Table("", headers, lines, notes, text_columns=2)], 120)
+    """Return rows of indices as a table for a terminal."""
+    lines = [[n if isinstance(n, str) else number(n, 2) for n in row.values()] for row in rows]
+    notes = [f"Indices of means over {seeds} seeds; seed_share of their variance is in each total."]
+    return plain_text([Table("", COLUMNS, lines, notes, text_columns=2)], 200)
