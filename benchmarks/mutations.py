@@ -92,7 +92,7 @@ MUTATIONS = [
     ("rendering/rasteriser.py", "ANTS[snapshot.ant_nests]", "ANTS[0 * snapshot.ant_nests]", RASTER),
     (
         "viewer/recorder.py",
-        "self.colony.tables_of_ants[self.world, slots] *",
+        "self.colony.tables_of_ants[0, slots] *",
         "0 * slots *",
         RECORDING,
     ),
@@ -198,7 +198,6 @@ MUTATIONS = [
     ("engines/runs/step.py", "enters & ant.carries", "moves & ant.carries", BATCHED),
     ("task/rules/vision.py", "(state >> 1) & 21", "(state >> 1) & 5", BATCHED),
     ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", LONE_NOISE),
-    ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
     ("engines/runs/kernels.py", "= paper_state, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
     ("features/life.py", "a.age >= lifespan", "a.age > lifespan", COLONY),
@@ -269,7 +268,6 @@ MUTATIONS = [
     ("analysis/statistics.py", "np.sqrt(n / (n - 1))", "np.sqrt((n - 1) / n)", STATISTICS),
     ("analysis/statistics.py", "cubes / (6 *", "cubes / (3 *", STATISTICS),
     ("analysis/statistics.py", "levels * (last + 2) - 1", "levels * last", STATISTICS),
-    ("analysis/statistics.py", "- (n - 1) * statistic", "- n * statistic", STATISTICS),
     ("analysis/findings.py", "max(1, len(readings))", "max(1, len(contrasts))", FINDINGS),
     ("analysis/findings.py", "< self.low or low > self.high", "< self.low", FINDINGS),
     (
@@ -313,8 +311,8 @@ MUTATIONS = [
     # Recorder and viewer.
     ("viewer/recorder.py", "executed + 16 *", "executed + 8 *", RECORDING),
     ("viewer/recorder.py", "[order] + 8 * carrying", "[order] + 8 * ~carrying", RECORDING),
-    ("viewer/recorder.py", "*rates, *counts, clock)", "*rates, *counts, tick)", RECORDING),
-    ("viewer/recorder.py", "colony.delivered[self.world] + totals", "0 * totals", SESSION),
+    ("viewer/recorder.py", "*rates, *counts, *clocks)", "*rates, *counts, *[0] * 9)", RECORDING),
+    ("viewer/recorder.py", "colony.delivered[0] + totals", "0 * totals", SESSION),
     ("viewer/recorder.py", "        late._forget()\n", "", SESSION),
     ("viewer/recorder.py", "[new] = False", "[new] = True", RECORDING),
     (
@@ -353,7 +351,12 @@ MUTATIONS = [
         "2",
         "tests/worlds/test_world_validation.py",
     ),
-    ("worlds/world.py", "np.lexsort((words, distance))", "np.argsort(words)", "tests/worlds"),
+    (
+        "worlds/world.py",
+        "np.lexsort((words(cells), distance[near]))",
+        "words(cells).argsort()",
+        "tests/worlds",
+    ),
     ("worlds/world.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
     ("grid/hexgrid.py", "difference > -y", "difference >= -y", "tests/grid"),
     # Measures and results.
