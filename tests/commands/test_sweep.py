@@ -465,7 +465,6 @@ def test_a_design_has_rows_of_drawn_values_indices_and_figures(sweep):
     assert [(row["measure"], row["setting"].rpartition(".")[2]) for row in indices][:3] == [
         *(("blocked", "half_life"), ("blocked", "view"), ("blocked", "slip"))
     ]
-    assert all(0 <= row["seed_share"] <= 1 for row in indices)
     assert "The 10 of 20 points with the highest blocked:" in out
     assert "first_order" in out
     again = sweep(DESIGN)
