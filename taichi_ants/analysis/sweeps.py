@@ -95,10 +95,7 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
     """Draw a measure against the first setting that varies, a line for each value of the others.
 
     `settings` are those that vary, for each of P points, `values` the measure, float64 (P, S), of S
-    seeds, and `words` its name.
-
-    Raises:
-        AntsError: The file (.png) cannot be written.
+    seeds, and `words` its name. Raises AntsError if the file (.png) cannot be written.
     """
     names = columns_of(settings)
     others = [name for name in names[1:] if len({str(row.get(name)) for row in settings}) > 1]
@@ -162,9 +159,7 @@ def draw_design(
 
     `settings` are those of P points, `values` the measure, float64 (P, S), of S seeds, and `words`
     its name. A panel has means over an eighth of the points, or over those with the same choice.
-
-    Raises:
-        AntsError: The file (.png) cannot be written.
+    Raises AntsError if the file (.png) cannot be written.
     """
     means, rows = known_means(values), -(-len(names) // _COLUMNS)
     lines = {name: {words: _parts_of([row[name] for row in settings], means)} for name in names}

@@ -140,8 +140,7 @@ class Design(Settings):
     def shares(self, dimensions: int) -> np.ndarray:
         """Return points of the unit cube, float64 (points, dimensions), for other than grids.
 
-        Raises:
-            AntsError: `sensitivity` needs SALib, which is not installed.
+        Raises AntsError if `sensitivity` needs SALib, which is not installed.
         """
         n: Any = self.samples
         if self.sensitivity:

@@ -91,11 +91,7 @@ class Sweep:
 
 
 def plan(options: Mapping[str, Any]) -> Sweep:
-    """Return the sweep of the option `file`; this makes a module of a study, see `studies.command`.
-
-    Raises:
-        AntsError: The file cannot be read, or a setting is not allowed; the message names the file.
-    """
+    """Return the sweep of the option `file`; AntsError, which names the file, if it is wrong."""
     path = Path(options["file"])
     text = files.read_text(path)
     try:
@@ -124,8 +120,7 @@ def sweep_of(file: Settings) -> Sweep:
         raise AntsError(f"sensitivity is for one [vary] table, but there are {len(grids)}.")
     built = dict[str, Any]()
     points = tuple(base.point(row, built) for row in rows)
-    check_training(base.fixed, points)
-    for of_table, names in grids:
+    for of_table, names in [(slice(None), base.fixed), *grids]:
         check_training(names, points[of_table])
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
