@@ -142,7 +142,7 @@ def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
             line.set_linestyle("none")
             axes.vlines(x, low, high, color=colour)
     if not numbers:
-        axes.set_xticks(range(len(ticks)), ticks)
+        axes.set_xticks(range(len(ticks)), [tick.replace("_", "\n") for tick in ticks])
     elif _far_apart(places):
         style.logarithmic(axes.xaxis, (1,))
         axes.set_xticks(sorted(set(places)))
@@ -171,7 +171,7 @@ def draw_design(
         for axes, name in zip(panels.flat, names, strict=False):
             draw_lines(axes, lines[name], [*lines.values()])
             if axes.get_xscale() == "log":
-                style.logarithmic(axes.xaxis, (1,))  # instead of a tick for each mean
+                style.logarithmic(axes.xaxis, (1, 3))  # instead of a tick for each mean
             axes.set_xlabel(short(name, names))
         figure.supylabel(words)
         caption = (
