@@ -185,5 +185,5 @@ def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[dict
 def report(rows: Sequence[Mapping[str, Any]], seeds: int) -> str:
     """Return rows of indices as a table for a terminal."""
     lines = [[n if isinstance(n, str) else number(n, 2) for n in row.values()] for row in rows]
-    notes = [f"Indices of means over {seeds} seeds; what seeds change in them is in each total."]
+    notes = [f"Indices of means over {seeds} seeds, whose remaining change is in each total."]
     return plain_text([Table("", COLUMNS, lines, notes, text_columns=2)], 200)
