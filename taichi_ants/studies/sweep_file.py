@@ -106,9 +106,11 @@ class Base(NamedTuple):
                 is_whole = name in ("world.seed", *of_points)
                 whole = declaration.kind is int if declaration else is_whole
                 axes[name] = Range.of(name, values, whole)
-            else:
-                _check_once(name, values)
-                axes[name] = values
+                continue
+            axes[name] = values
+            for n, value in enumerate(values):
+                if value in values[:n]:
+                    raise AntsError(f"{name} has {shown(value)} more than once; remove one.")
         return axes
 
     def _check_has_table(self, name: str) -> None:
@@ -190,12 +192,6 @@ def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
 
 def as_list(value: Any) -> list:
     return value if isinstance(value, list) else [value]
-
-
-def _check_once(name: str, values: list) -> None:
-    for n, value in enumerate(values):
-        if value in values[:n]:
-            raise AntsError(f"{name} has {shown(value)} more than once; remove one of them.")
 
 
 def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:
