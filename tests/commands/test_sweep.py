@@ -406,7 +406,7 @@ def test_settings_of_a_training_that_does_not_happen_are_refused():
 
 def test_the_exploration_of_an_evaluation_is_checked():
     file = {"kind": "colony", "measures": ["deliveries"], "episodes": 0, "vary": {"rollouts": [1]}}
-    with pytest.raises(AntsError, match="epsilon is 1.5; it must be a number between 0 and 1"):
+    with pytest.raises(AntsError, match="a number between 0 and 1"):
         sweep_of({**file, "policy": "random", "evaluation_epsilon": 1.5})
     with pytest.raises(AntsError, match="evaluation_epsilon has no effect"):
         sweep_of({**file, "task": {"choice": "deneubourg"}, "evaluation_epsilon": 0.1})
