@@ -388,8 +388,6 @@ MUTATIONS = [
     ("studies/design.py", "margin = 0.5 if axis.whole else 0.0", "margin = 0.0", DESIGN),
     ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
     ("studies/design.py", "random_base2(whole)[:n]", "random_base2(whole)", DESIGN),
-    ("studies/design.py", "- drawn.mean(axis=0)", "", DESIGN),
-    ("studies/design.py", "(seeds - 1)) / seeds", "(seeds - 1))", DESIGN),
     ("studies/design.py", '"seed": RANDOM_SEED', '"seed": 0', DESIGN),
     # Archives of studies, and descriptions of models.
     ("commands/reproduce.py", "> MOST_BYTES:", "> 2 * MOST_BYTES:", ARCHIVE),
