@@ -28,7 +28,7 @@ from taichi_ants.envs.vector import (
     Step,
     Worlds,
 )
-from taichi_ants.errors import as_array, check_one_of, checked_whole, expect, shown, whole
+from taichi_ants.errors import check_one_of, checked_whole, shown, whole
 from taichi_ants.features.support import CHOICE, LONE
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
@@ -254,7 +254,6 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         *,
         epsilon: float = 0.0,
         seed: int | None = None,
-        out: Rollout | None = None,
     ) -> Rollout:
         """Return the results of several steps, with given actions or by a policy.
 
@@ -270,8 +269,6 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
             epsilon: The probability with which an ant that follows a policy acts at random.
             seed: The seed of the policy's random numbers, which also break ties. None draws one
                 from `np_random`, which `reset(seed=...)` seeds.
-            out: An earlier rollout of the same size. This call overwrites its arrays, instead of
-                creating new ones.
 
         Raises:
             ResetNeeded: No episode has begun, or autoreset_mode is "Disabled" and one has ended.
@@ -284,18 +281,11 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         shape, table = (length, n), ants.shown.table
         into = Rollout(
             np.empty((length + 1, n, *table.shape[1:]), table.dtype),
-            np.empty(shape, np.int64),
+            np.empty(shape, np.int64) if actions is None else actions,
             *(np.empty(shape), np.empty(shape, bool), np.empty(shape, bool)),
             events=np.empty(shape, np.uint8),
             final_observations=table[:0],
         )
-        if out is not None:
-            expect("out", out, Rollout)
-            for name, mine, wanted in zip(into._fields[:-1], out, into, strict=False):
-                as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
-            into = out
-        if actions is not None:
-            into = into._replace(actions=actions)
         if q_values is not None:
             drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
             best = q_values >= q_values.max(axis=1, keepdims=True)

@@ -123,12 +123,9 @@ class Ants(ABC):
 
 def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World, ...]:
     entries = [world] if isinstance(world, (str, os.PathLike, World)) else world
-    if not isinstance(entries, (list, tuple)) or not entries:
-        raise AntsError(
-            f"world is {shown(world)}; give the name of a world, a World, or a list of them."
-        )
-    if len(entries) > most:
-        raise AntsError(f"world lists {len(entries)} worlds; it must list at most {most}.")
+    if not isinstance(entries, (list, tuple)) or not 0 < len(entries) <= most:
+        several = f", or a list of 1 to {most} of them" if most > 1 else ""
+        raise AntsError(f"world is {shown(world)}; give the name of a world or a World{several}.")
     built = []
     for entry in entries:
         if not isinstance(entry, World):
@@ -256,7 +253,9 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
     def _waiting(self, method: str) -> np.ndarray:
         """Return the worlds at an episode's end; ResetNeeded if the method needs a reset before."""
         self._check_begun(f"{method}()")
-        over = self._over
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:  # the next episodes have begun
+            return np.zeros(self._n_worlds, bool)
+        over = self._ants.over()
         if self.autoreset_mode is AutoresetMode.DISABLED and over.any():
             number = over.argmax() * (self.num_envs // self._n_worlds)
             raise ResetNeeded(
@@ -264,13 +263,6 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
                 f'options={{"reset_mask": ...}} before {method}().'
             )
         return over
-
-    @property
-    def _over(self) -> np.ndarray:
-        """Whether the episode of each world has ended, and the next one not begun, bool (W,)."""
-        if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            return np.zeros(self._n_worlds, bool)
-        return self._ants.over()
 
     def _infos(self, facts: dict[str, np.ndarray], have: np.ndarray) -> dict[str, Any]:
         infos: dict[str, Any] = dict(facts)
