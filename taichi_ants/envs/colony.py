@@ -202,7 +202,7 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         # The number of ants is fixed.
         supports = SUPPORTS - {"life.births", "life.lifespan"}
         worlds = ColonyWorlds(n // ants, arguments, ants, start, supports=supports)
-        super().__init__(worlds, n // ants, n, autoreset_mode, render_mode)
+        super().__init__(worlds, n, autoreset_mode)
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
         if worlds.task.delivery == "terminates" and not same_step:
             raise AntsError(

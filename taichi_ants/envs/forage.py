@@ -22,7 +22,6 @@ from taichi_ants.envs.vector import (
     Ants,
     AntVectorEnv,
     Arguments,
-    OfAnts,
     Place,
     Rules,
     Step,
@@ -106,7 +105,7 @@ class LoneAnts(Ants):
         return self._scene.draw(now, rendering.Status(facts, state, observation=sees))
 
 
-class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
+class HexForageEnv(gymnasium.Env[Any, Any]):
     """An ant on a hexagonal grid that searches for food and carries it to its queen.
 
     The rules are those of "Ants and Reinforcement Learning Algorithms"; see
@@ -167,10 +166,10 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
         options.
         """
         super().reset(seed=seed)
-        if seed is None and not self._begun:
+        if seed is None and not self._ants.begun:
             seed = int(self.np_random.integers(2**63))
         self._ants.begin(np.ones(1, bool), [seed])
-        self._begun = True
+        self._ants.begun = True
         return self._seen()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -183,7 +182,7 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
             ResetNeeded: No episode has begun, or it has ended.
             InvalidAction: The action does not exist.
         """
-        self._check_begun("step()")
+        self._ants.check_begun("step()")
         if self._arrays["results"][0] >= TRUNCATED:
             raise ResetNeeded("the episode has ended; call reset() before step().")
         if not self.action_space.contains(action):
@@ -206,12 +205,12 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
 
     def action_masks(self) -> np.ndarray:
         """Return `info["action_mask"]` as bool (5,), for MaskablePPO of sb3-contrib."""
-        self._check_begun("action_masks()")
+        self._ants.check_begun("action_masks()")
         return ACTION_MASKS[self._arrays["paper_states"][0]].astype(bool)
 
     def render(self) -> Any:
         """Return a picture, uint8 (720, 1280, 3), or None without a render mode."""
-        self._check_begun("render()")
+        self._ants.check_begun("render()")
         return None if self.render_mode is None else self._ants.draw(0)
 
 
@@ -245,7 +244,7 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         n = checked_whole("num_envs", num_envs)
         arguments = Arguments(world, task, max_steps, observation_format, render_mode)
         ants = LoneAnts(n, delivery, arguments)
-        super().__init__(ants, n, n, autoreset_mode, render_mode)
+        super().__init__(ants, n, autoreset_mode)
 
     def rollout(
         self,
