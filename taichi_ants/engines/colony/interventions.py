@@ -30,11 +30,7 @@ from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, NestRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.errors import AntsError, as_array, count
-from taichi_ants.grid.constants import (
-    N_HEADINGS,
-    STREAM_BORN,
-    STREAM_INTERVENTION,
-)
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_INTERVENTION
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.interventions import Intervention, flat_indices
@@ -394,9 +390,8 @@ class Interventions:
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None
         n = len(colony.worlds)
-        numbers = as_array(
-            "worlds", range(n) if worlds is None else worlds, "iu", (None,), 0, n - 1
-        )
+        given = range(n) if worlds is None else worlds
+        numbers = as_array("worlds", given, "iu", (None,), 0, n - 1)
         self.worlds = tuple(dict.fromkeys(numbers.tolist()))
         self._first = colony.worlds
         self.starts = [_start_of(world) for world in colony.worlds] if lasting else []

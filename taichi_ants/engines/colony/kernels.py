@@ -79,10 +79,8 @@ class Variant:
 
     def field(self, c: Any, number: int) -> trail.PheromoneArrays:
         """Return the arrays and numbers of a pheromone; 0 is the trail."""
-        (dense, view, deposit, evaporation), end = (
-            self.pheromones[number],
-            f"_{number}" * (number > 0),
-        )
+        dense, view, deposit, evaporation = self.pheromones[number]
+        end = f"_{number}" if number else ""
         return trail.PheromoneArrays(
             dense,
             view == "half",

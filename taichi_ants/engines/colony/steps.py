@@ -654,11 +654,9 @@ def lays_field(number: int) -> Callable[..., None]:
     @function
     def lay_apart(c, v, w, chunk, ant, tick):
         cell, goes, carries = c.want[ant], c.cell[ant], trait(c.carries, ant)
-        event, paper_state, had_food = trait(c.event, ant), trait(c.paper_state, ant), carries
-        if event == Event.PICKED_UP:
-            had_food = 0
-        if event == Event.DELIVERED:
-            had_food = 1
+        event, paper_state = trait(c.event, ant), trait(c.paper_state, ant)
+        changed = (event == Event.PICKED_UP) | (event == Event.DELIVERED)
+        had_food = ti.select(changed, 1 - carries, carries)
         age = ti.select(carries == had_food, c.carried[ant] - 1, 0)
         occasions = occasions_of(had_food, paper_state, executed_by(c, v, ant), event, goes != cell)
         for rests in ti.static(v.at["rests"]):
