@@ -56,8 +56,8 @@ _GROUNDS = {"rock": OBSTACLE, "food": FOOD}
 class _World:
     """One world of a colony with interventions; its slots, cells and arrays are of this world.
 
-    The methods up to `trail` have the names of interventions. A method that returns a `Change`
-    yields once, between its checks and its effects.
+    The first methods have the names of interventions, see the classes with these paths. A method
+    that returns a `Change` yields once, between its checks and its effects.
     """
 
     def __init__(self, interventions: Interventions, w: int) -> None:
@@ -65,7 +65,6 @@ class _World:
         self.rows = self.colony.arrays["worlds"][:, w]
 
     def place(self, change: language.Place) -> Change:
-        """Place rock or food, see `_put`, or move a queen to a cell without rock or food."""
         cells, foods = self._index(change.cells), list(self.colony.task.foods)
         if change.what != "queen":
             kind = foods.index(change.kind) if change.kind else 0
@@ -80,14 +79,9 @@ class _World:
         return self._carry(self.queen_cells[nest], cells[0], QUEEN, nest)
 
     def clear(self, change: language.Clear) -> Change:
-        """Remove rock and food."""
         return self._put(self._index(change.cells), EMPTY)
 
     def move(self, change: language.Move) -> Change:
-        """Move the rock, the food or the queen of a cell to another; an ant there moves aside.
-
-        Has no effect if the first cell has none of them, or the other one is not free.
-        """
         cell, to = flat_indices(self.colony.grid, change.cells)
         what, number, loads = int(self.view("ground")[cell]), 0, None
         if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
@@ -102,7 +96,6 @@ class _World:
         yield from self._carry(cell, to, what, number, loads)
 
     def trail(self, change: language.SetTrail) -> Change:
-        """Set the trail, or a further field, of cells other than rocks."""
         everywhere = np.flatnonzero(self.colony.grid.exists)
         cells = everywhere if change.cells is None else self._index(change.cells)
         number = [TRAIL, *self.colony.task.fields].index(change.field)
@@ -110,7 +103,6 @@ class _World:
         self._lay(cells[self.view("walls")[cells] == 0], change.level, number)
 
     def add_ants(self, change: language.AddAnts) -> Change:
-        """Put newborn ants on free start cells, or on those of the cells given that are empty."""
         if change.cells is None:
             return self._add_some(self._amount(change), change.nest)
         cells = self._index(change.cells)
@@ -121,18 +113,17 @@ class _World:
         return self._add(cells, nests)
 
     def remove_ants(self, change: language.RemoveAnts) -> Change:
-        """Remove random ants, or those on cells, with the food that they carry."""
         slots = self._living_slots(change.nest)
         cells = None if change.cells is None else self._index(change.cells)
         yield
         if cells is None:
             words = self.all.stream(self.w).bits(len(slots))
-            self._remove(slots[np.argsort(words, kind="stable")[: self._amount(change)]])
+            chosen = np.argsort(words, kind="stable")[: self._amount(change)]
         else:
-            self._remove(slots[np.isin(self.view("cell")[slots], cells)])
+            chosen = np.isin(self.view("cell")[slots], cells)
+        self._remove(slots[chosen])
 
     def ants(self, change: language.SetAnts) -> Change:
-        """Set the number of ants; new ants take free cells in the order of `World.start`."""
         living = self._living_slots()
         if self.all.lasting:
             self._check_room(self.all.starts[self.w], change.number)
