@@ -118,10 +118,10 @@ class _World:
         yield
         if cells is None:
             words = self.all.stream(self.w).bits(len(slots))
-            chosen = np.argsort(words, kind="stable")[: self._amount(change)]
+            slots = slots[np.argsort(words, kind="stable")[: self._amount(change)]]
         else:
-            chosen = np.isin(self.view("cell")[slots], cells)
-        self._remove(slots[chosen])
+            slots = slots[np.isin(self.view("cell")[slots], cells)]
+        self._remove(slots)
 
     def ants(self, change: language.SetAnts) -> Change:
         living = self._living_slots()
