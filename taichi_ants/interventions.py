@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
+from taichi_ants import settings
 from taichi_ants.errors import (
     AntsError,
     as_array,
@@ -28,18 +29,7 @@ from taichi_ants.errors import (
     refuse,
 )
 from taichi_ants.features import FEATURES
-from taichi_ants.settings import (
-    Setting,
-    Settings,
-    Share,
-    all_of,
-    declared,
-    flat,
-    named_groups,
-    nested,
-    not_a_setting,
-    settings_of_entry,
-)
+from taichi_ants.settings import Setting, Settings, Share, declared
 from taichi_ants.task import Task
 from taichi_ants.task.field import TRAIL
 from taichi_ants.task.model import Model
@@ -52,7 +42,7 @@ if TYPE_CHECKING:
 One = TypeVar("One", bound="ShorthandSettings")
 _MOST = 2**24  # ants, see `arguments.MAX_ANTS`
 _CELLS = Setting("cells, each [x, y, z], or the name of a region", or_region=True)
-_NAMED = {group.name: group for group in named_groups(Task)}
+_NAMED = {group.name: group for group in settings.named_groups(Task)}
 _SHORT = {  # the short forms of interventions, by the setting that such a value is
     "number": "a whole number of ants",
     "share": "a share such as 0.5",
@@ -296,12 +286,12 @@ class SetTask(Intervention, path="task"):
         values = []
         for name, value in self.values:
             group, entry, *_ = [*name.split("."), "", ""]
-            settings = {setting.path: setting for setting in all_of(Task)}
+            known = {setting.path: setting for setting in settings.all_of(Task)}
             if entry and group in _NAMED:
-                settings = settings_of_entry(_NAMED[group], entry)
-            if (setting := settings.get(f"task.{name}")) is None:
-                known = [path.removeprefix("task.") for path in settings]
-                raise AntsError(f"`task.{name}` {not_a_setting(name, known)}")
+                known = settings.settings_of_entry(_NAMED[group], entry)
+            if (setting := known.get(f"task.{name}")) is None:
+                names = [path.removeprefix("task.") for path in known]
+                raise AntsError(f"`task.{name}` {settings.not_a_setting(name, names)}")
             values.append((name, setting.checked(value)))
         object.__setattr__(self, "values", tuple(sorted(values)))
 
@@ -309,7 +299,7 @@ class SetTask(Intervention, path="task"):
     def converted(cls, value: Any) -> Any:
         if not isinstance(value, Mapping):
             return value
-        numbers = flat({k: v for k, v in value.items() if isinstance(k, str)})
+        numbers = settings.flat({k: v for k, v in value.items() if isinstance(k, str)})
         return cls(tuple(numbers.items()))
 
     def as_dict(self) -> dict[str, Any]:
@@ -317,7 +307,7 @@ class SetTask(Intervention, path="task"):
 
     def changed(self, task: Task) -> Task:
         """Return the task with the new values."""
-        return task.replace(**nested(dict(self.values)))
+        return task.replace(**settings.nested(dict(self.values)))
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         changed = self.changed(task)
@@ -326,7 +316,7 @@ class SetTask(Intervention, path="task"):
             for rules in (task, changed)
         )
         if castes != new_castes or Model(task, learns) != Model(changed, learns):
-            old, new = flat(task.as_dict()), flat(changed.as_dict())
+            old, new = settings.flat(task.as_dict()), settings.flat(changed.as_dict())
             names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
             changes = (f"{name} from {old.get(name)!r} to {new.get(name)!r}" for name in names)
             raise AntsError(
@@ -368,9 +358,9 @@ def from_dict(facts: Any) -> Intervention:
     if not isinstance(facts, Mapping) or len(facts) != 1:
         names = ", ".join(INTERVENTIONS)
         refuse("an intervention", facts, f"a table with the name of one intervention: {names}")
-    ((name, settings),) = facts.items()
+    ((name, values),) = facts.items()
     check_one_of("the name of an intervention", name, tuple(INTERVENTIONS))
-    return INTERVENTIONS[name].from_dict(settings)
+    return INTERVENTIONS[name].from_dict(values)
 
 
 def flat_indices(grid: AxialGrid, cells: Sequence[Any]) -> list[int]:

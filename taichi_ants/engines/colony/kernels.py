@@ -15,16 +15,9 @@ import taichi as ti
 from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
-from taichi_ants.engines.colony import columns, learning, life, own_inputs, steps, trail
+from taichi_ants.engines.colony import columns, layout, learning, life, own_inputs, steps, trail
 from taichi_ants.engines.colony.columns import function
-from taichi_ants.engines.colony.layout import (
-    GAVE_UP,
-    Barrier,
-    Order,
-    Stage,
-    WorldRow,
-    array_of,
-)
+from taichi_ants.engines.colony.layout import Barrier, Order, WorldRow
 from taichi_ants.engines.colony.views import names_of
 from taichi_ants.features import hooks_at
 from taichi_ants.learners.memory import guarded, read_rates
@@ -85,7 +78,7 @@ class Variant:
             dense,
             view == "half",
             view == "strongest_under_carriers",
-            getattr(c, array_of(number, dense)),
+            getattr(c, layout.array_of(number, dense)),
             getattr(c, f"spare{end}") if dense else None,
             *(getattr(c, name + end) for name in trail.NUMBERS),
             deposited_when=getattr(c, f"deposited_when{end}") if number else None,
@@ -172,7 +165,7 @@ def is_taken(c, v, ant):
     """Return whether an ant is in a slot; without vacant slots, always, while a kernel compiles."""
     taken = True
     if ti.static(v.slots_matter):
-        taken = columns.trait(c.stage, ant) != Stage.VACANT
+        taken = columns.trait(c.stage, ant) != layout.Stage.VACANT
     return taken
 
 
@@ -226,7 +219,7 @@ def wait_for_all(c, part, parts, number):
             spins += 1
         goes_on = ti.cast(arrived >= wanted, ti.i32)
         ti.atomic_add(
-            c.barrier[Barrier.OPENED], ti.select(goes_on == 1, ti.i64(1), ti.i64(GAVE_UP))
+            c.barrier[Barrier.OPENED], ti.select(goes_on == 1, ti.i64(1), ti.i64(layout.GAVE_UP))
         )
     else:
         ti.atomic_add(c.barrier[Barrier.ARRIVED], 1)
@@ -235,7 +228,7 @@ def wait_for_all(c, part, parts, number):
             opened = ti.atomic_add(c.barrier[Barrier.OPENED], 0)
         # The first part may have opened this barrier, and given up at the next one since then.
         if opened < 0:
-            opened -= ti.i64(GAVE_UP)
+            opened -= ti.i64(layout.GAVE_UP)
         goes_on = ti.cast(opened > number, ti.i32)
     return goes_on
 
