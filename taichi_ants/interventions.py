@@ -19,15 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 import numpy as np
 
 from taichi_ants import settings
-from taichi_ants.errors import (
-    AntsError,
-    as_array,
-    check_one_of,
-    count,
-    entries_of,
-    is_flag,
-    refuse,
-)
+from taichi_ants.errors import AntsError, as_array, check_one_of, count, entries_of, is_flag, refuse
 from taichi_ants.features import FEATURES
 from taichi_ants.settings import Setting, Settings, Share, declared
 from taichi_ants.task import Task

@@ -12,13 +12,7 @@ from taichi_ants.protocol import At, Every, ProtocolEvent, When
 from taichi_ants.reference.ants import Ant, start_order
 from taichi_ants.reference.colony import EpisodeRecord, ReferenceColony
 from taichi_ants.reference.features.castes import draw_caste
-from taichi_ants.reference.geometry import (
-    Cell,
-    distance,
-    existing_cells,
-    listed_cells,
-    normal_form,
-)
+from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells, normal_form
 from taichi_ants.reference.measures import measured
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
