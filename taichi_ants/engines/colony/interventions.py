@@ -70,10 +70,9 @@ class _World:
             kind = foods.index(change.kind) if change.kind else 0
             return self._put(cells, _GROUNDS[change.what], kind)
         if not self._can_be_free(cells[0]):
+            cell = tuple(self.colony.grid.cells(cells[0]).tolist())
             raise AntsError(
-                "the queen cannot move to cell "
-                f"{tuple(self.colony.grid.cells(cells[0]).tolist())}, because it is not empty; "
-                "choose an empty cell."
+                f"the queen cannot move to cell {cell}, because it is not empty; choose another."
             )
         nest = change.nest or 0
         return self._carry(self.queen_cells[nest], cells[0], QUEEN, nest)
@@ -147,9 +146,7 @@ class _World:
         self._step_aside(ants, to)
         self._fill(there, what, kind)
 
-    def _carry(
-        self, cell: int, to: int, what: int, number: int, loads: int | None = None
-    ) -> Change:
+    def _carry(self, cell: int, to: int, what: int, number: int, loads: Any = None) -> Change:
         """Move what is in a cell to another one; see `_fill`."""
         yield from self._start_with([cell, to], [EMPTY, what | number << _NUMBER])
         self._step_aside(*self._aside(np.array([to])))
@@ -231,9 +228,7 @@ class _World:
                 f"{count(int(room), 'free cell')}; leave more cells free, or choose fewer ants."
             )
 
-    def _fill(
-        self, cells: np.ndarray, what: int, number: int = 0, loads: int | None = None
-    ) -> None:
+    def _fill(self, cells: np.ndarray, what: int, number: int = 0, loads: Any = None) -> None:
         """Make cells without ants EMPTY, OBSTACLE or FOOD, by default with all loads, or one QUEEN.
 
         `number` is the kind of the food, or the nest of the queen. See `food_sources.changed`.
@@ -454,13 +449,18 @@ class Interventions:
 
     def state(self) -> str:
         """Return a hash of the whole state; colonies with equal hashes behave identically."""
-        colony = self.colony
-        moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
-        streams = [self.stream(w).state for w in self.worlds]
-        rest = (self.ants, streams, colony.task.as_dict(), colony.training.as_dict())
+        colony, streams = self.colony, [self.stream(w).state for w in self.worlds]
+        rest: list[Any] = [
+            colony.epsilon,
+            colony.learning_rate,
+            colony.length,
+            colony.ticks,
+            colony.ants,
+        ]
+        rest += [self.ants, streams, colony.task.as_dict(), colony.training.as_dict()]
         arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer")}
         arrays |= {f"start {w}": start for w, start in enumerate(self.starts)}
-        digest = hashlib.sha256(files.to_json([*moment, *rest]).encode())
+        digest = hashlib.sha256(files.to_json(rest).encode())
         for name, array in sorted(arrays.items()):
             digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
             digest.update(np.ascontiguousarray(array).data)
