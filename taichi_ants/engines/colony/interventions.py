@@ -450,7 +450,7 @@ class Interventions:
     def state(self) -> str:
         """Return a hash of the whole state; colonies with equal hashes behave identically."""
         colony, streams = self.colony, [self.stream(w).state for w in self.worlds]
-        rest: list[Any] = [
+        rest: Any = [
             colony.epsilon,
             colony.learning_rate,
             colony.length,
