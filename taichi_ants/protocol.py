@@ -78,8 +78,7 @@ class At(ProtocolEvent, path="at"):
 
     def times(self, length: int) -> range:
         """Return the tick."""
-        tick = self._within("tick", length)
-        return range(tick, tick + 1)
+        return range(self._within("tick", length), self.tick + 1)
 
 
 @dataclass(frozen=True)

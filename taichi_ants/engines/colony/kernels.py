@@ -48,7 +48,6 @@ class Variant:
         self.mark_of_rest = STANDS if model.traffic.shared else 0
         # The hooks of features at each point, in their order.
         self.at = hooks_at(model.features)
-        self.can_rest = bool(self.at["rests"])
         self.names = names_of(model)
         own = own_inputs.own_rules(model.rules)
         self.draw_by_cues = steps.draw_cell if model.choice == "deneubourg" else None
@@ -89,10 +88,6 @@ class Variant:
     def dense_fields(self, c: Any) -> list[trail.PheromoneArrays]:
         """Return the arrays and numbers of the dense pheromones."""
         return [self.field(c, number) for number, dense in enumerate(self.dense_by_number) if dense]
-
-    def further_fields(self, c: Any) -> list[trail.PheromoneArrays]:
-        """Return the arrays and numbers of the pheromones other than the trail."""
-        return [self.field(c, number) for number in range(1, len(self.pheromones))]
 
 
 variant = cache(Variant)

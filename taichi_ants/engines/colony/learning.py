@@ -99,7 +99,7 @@ def observe_and_learn(c, v, w, chunk, ant, tick):
     if lives:
         c.wants[marked] = 0
     note_seen(c, v, ant, paper_state, state)
-    if ti.static(v.can_rest):
+    if ti.static(v.at["rests"]):
         next_action = ti.select(stops, -1, next_action)
         rest(c, v, w, ant, acts, stops)
     if ti.static(v.draws_next_action):
@@ -390,7 +390,7 @@ def weight_of(c, v, pair, count):
 def draw_pair(c, v, w, chunk, ant, tick):
     """Draw a visited pair for a planning update of an ant."""
     acted = columns.trait(c.stage, ant) != Stage.NEWBORN
-    if ti.static(v.can_rest):
+    if ti.static(v.at["rests"]):
         acted = acted & (columns.trait(c.event, ant) != Event.NONE)
     if acted & learns(c, v, ant):
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))

@@ -586,10 +586,9 @@ def act(c, v, w, chunk, ant, tick):
         occasions = trail.occasions_of(had_food, paper_state, action, event, goes != cell)
         for rests in ti.static(v.at["rests"]):
             occasions *= 1 - rests(ant_view(c, v, w, ant))
-        fields = ti.static([] if v.lays_in_turn else v.further_fields(c))
-        for i in ti.static(range(len(fields))):
-            if lays(c, v, ant, i + 1):
-                field = ti.static(fields[i])
+        for i in ti.static(range(1, 1 if v.lays_in_turn else len(v.pheromones))):
+            if lays(c, v, ant, i):
+                field = ti.static(v.field(c, i))
                 laid = field.deposited_when & occasions  # a single one, see `Field.deposited_when`
                 trail.lay(
                     *(c, v, field, w, ant, laid, cell, goes, wanted, tick, age),
