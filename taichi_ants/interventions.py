@@ -201,17 +201,16 @@ class SetAnts(Intervention, path="ants", short_for=("number",)):
 class Place(Intervention, path="place", short_for=("cells",)):
     """Place rock or food on cells, or the queen on one cell; ants there move aside.
 
-    Rock and food leave out the cells of queens, and cells whose ant has no room nearby.
+    Rock and food leave out the cells of queens, and cells whose ant has no room nearby. Without
+    `nest` or `kind`, the queen is that of nest 0, and the food is of the first kind.
     """
 
     what: Annotated[Literal["rock", "food", "queen"], Setting("thing to place")]
     cells: Annotated[Sequence, _CELLS]
-    nest: Annotated[
-        int | None, Setting("nest of the queen, by default 0", least=0, only=("what", "queen"))
-    ] = None
-    kind: Annotated[
-        str | None, Setting("kind of food; the first if left out", only=("what", "food"))
-    ] = None
+    nest: Annotated[int | None, Setting("nest of the queen", least=0, only=("what", "queen"))] = (
+        None
+    )
+    kind: Annotated[str | None, Setting("kind of food", only=("what", "food"))] = None
 
     def check(self) -> None:
         super().check()
@@ -249,12 +248,10 @@ class Clear(Intervention, path="clear", short_for=("cells",)):
 
 @dataclass(frozen=True)
 class SetTrail(Intervention, path="trail", short_for=("level",)):
-    """Set the trail, or a further field, of cells without rock; level 0 clears it."""
+    """Set the trail, or a further field, of cells, by default all, without rock; 0 clears it."""
 
     level: Annotated[int, Setting("trail level", least=0, most=MAX_DEPOSIT)]
-    cells: Annotated[
-        Sequence | None, _CELLS.replace(Setting("cells, or a region; all if left out"))
-    ] = None
+    cells: Annotated[Sequence | None, _CELLS] = None
     field: Annotated[str, Setting("name of the field")] = TRAIL
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
