@@ -207,9 +207,7 @@ class Place(Intervention, path="place", short_for=("cells",)):
 
     what: Annotated[Literal["rock", "food", "queen"], Setting("thing to place")]
     cells: Annotated[Sequence, _CELLS]
-    nest: Annotated[int | None, Setting("nest of the queen", least=0, only=("what", "queen"))] = (
-        None
-    )
+    nest: Annotated[int | None, Setting("nest of a queen", least=0, only=("what", "queen"))] = None
     kind: Annotated[str | None, Setting("kind of food", only=("what", "food"))] = None
 
     def check(self) -> None:
