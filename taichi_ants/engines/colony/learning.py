@@ -210,12 +210,8 @@ def error_of(c, v, w, pair, reward, terminated, seen, next_action):
     table = steps.table_of(c, v, w * v.n_groups + group_of_pair(v, pair))
     value, rates = place_in_tables(c, v, w, pair), rates_of(c, v, caste_of_pair(v, pair))
     error = v.td_error(
-        c.q[value],
-        reward,
-        discount_of(rates, terminated),
-        values_of(c.q, table, seen),
-        next_action,
-        rates.epsilon,
+        *(c.q[value], reward, discount_of(rates, terminated)),
+        *(values_of(c.q, table, seen), next_action, rates.epsilon),
     )
     if not ti.abs(error) < c.largest_error:
         c.q[value] = ti.math.nan  # a fixed-point sum would hide such an error

@@ -108,10 +108,7 @@ def see(c, v, cues, w, ant, tick):
         else:
             homing = ti.static(v.field(c, cues.followed))
             paper_state = vision.paper_state_homing(
-                homing.half,
-                ground_left,
-                ground_forward,
-                ground_right,
+                *(homing.half, ground_left, ground_forward, ground_right),
                 level_in_view(c, homing, left, tick),
                 level_in_view(c, homing, forward, tick),
                 level_in_view(c, homing, right, tick),
@@ -120,10 +117,7 @@ def see(c, v, cues, w, ant, tick):
     else:
         outbound = ti.static(v.field(c, cues.outbound))
         paper_state = vision.paper_state_foraging(
-            cues.half,
-            ground_left,
-            ground_forward,
-            ground_right,
+            *(cues.half, ground_left, ground_forward, ground_right),
             level_in_view(c, outbound, left, tick),
             level_in_view(c, outbound, forward, tick),
             level_in_view(c, outbound, right, tick),
