@@ -129,7 +129,7 @@ MUTATIONS = [
         CONFLICTS,
     ),
     ("task/rules/conflicts.py", "compass[N_HEADINGS - i]", "compass[i + 1]", CONFLICTS),
-    ("engines/colony/steps.py", "enters &= MOVES >> action", "enters &= 1", COLONY),
+    ("engines/colony/steps.py", "enters &= actions.MOVES >> action", "enters &= 1", COLONY),
     ("engines/colony/steps.py", "goes = cell + enters * (wanted - cell)", "goes = wanted", COLONY),
     (
         "engines/colony/learning.py",
@@ -230,7 +230,7 @@ MUTATIONS = [
         "(episode << 31) + numbers",
         EDITS,
     ),
-    ("engines/colony/interventions.py", "epsilon_decay=1.0, min", "min", SESSION),
+    ("engines/colony/interventions.py", 'f"{change.path}_decay": 1.0, ', "", SESSION),
     ("engines/colony/interventions.py", "numbers < colony.ants ", "numbers < 0 ", EDITS),
     # Protocols.
     (
