@@ -27,8 +27,8 @@ from taichi_ants.reference.features.castes import (
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS, learn_together
-from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, codes_in_view, observe
-from taichi_ants.reference.own_rules import choose_by_rule, pay, view_of
+from taichi_ants.reference.observations import OBSERVATIONS, codes_in_view, observe, yours
+from taichi_ants.reference.own_rules import choose_by_rule, pay
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task
@@ -79,12 +79,8 @@ class ReferenceColony:
         refuse_unsupported("the reference", task.uses(), COLONY)
         if training is None:  # ants choose without action values
             training = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
-        if task.observation in OBSERVATIONS:
-            self._row = OBSERVATIONS[task.observation]
-            self._turns = TURNS.get(task.observation, AHEAD)
-        else:
-            self._row = lambda world, ant: int(task.sees.encode(view_of(world, ant, task.sees)))
-            self._turns = task.sees.cells
+        self._row = OBSERVATIONS.get(task.observation) or partial(yours, task.sees)
+        self._turns = task.sees.cells  # in the order in which ants may misread them
         self.start_world, self.training = world, training
         self._ends_at_delivery = ends_at_delivery
         self.n_ants = ants  # at the start of an episode

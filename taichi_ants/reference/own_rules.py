@@ -1,32 +1,18 @@
-"""Your own rules and observations in the reference: the inputs of their Python functions."""
+"""Your own rules in the reference: the inputs of their Python functions."""
 
 from __future__ import annotations
 
 from collections.abc import Container
-from types import SimpleNamespace
 from typing import Any
-
-import numpy as np
 
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.choice import ways
 from taichi_ants.reference.features import inputs_of
-from taichi_ants.reference.geometry import distance
-from taichi_ants.reference.observations import (
-    AHEAD,
-    ants_in_view,
-    cells_in_view,
-    codes_seen,
-    levels_in_view,
-    more_cells,
-    nestmate,
-    strongest_in_view,
-)
+from taichi_ants.reference.observations import AHEAD, levels_in_view
 from taichi_ants.reference.random_stream import WORDS
-from taichi_ants.reference.world_state import Trail, WorldState, computed
+from taichi_ants.reference.world_state import WorldState, computed
 from taichi_ants.rules import Rule
-from taichi_ants.rules.inputs import Vector
-from taichi_ants.task import Observation, Task
+from taichi_ants.task import Task
 
 
 def choose_by_rule(
@@ -64,50 +50,3 @@ def _of_ant(
         inputs[f"levels{name}"] = levels_in_view(world, ant, trail, AHEAD, hidden)
         inputs[f"level{name}"] = trail.level(ant.cell)
     return inputs
-
-
-def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleNamespace:
-    """Return the view of an ant, see `Observation`.
-
-    A misread cell has no ant, no level, and is not nearer.
-    """
-    turns, cells = observation.cells, cells_in_view(ant, observation.cells)
-    is_seen = [turn not in ant.misread for turn in turns]
-    cue, queen = world.cue(ant), world.queens[ant.nest]
-    # All levels of cues are float32 if those of one cue are.
-    cues = {name for pair in world.cues for name in pair if name != "compass"}
-    dense = any(world.pheromones[name].rule.dense for name in cues)
-
-    def levels(trail: Trail, dense: bool) -> tuple[Vector, Any]:
-        """Return the levels of the cells, and that of the ant's cell."""
-        kind: type = np.float32 if dense else np.int32
-        in_view = levels_in_view(world, ant, trail, turns, ant.misread)
-        return Vector(map(kind, in_view)), kind(trail.level(ant.cell))
-
-    ahead, own_level = levels(cue, dense)
-    if world.cues[ant.caste][1] == "compass":
-        far = distance(ant.cell, queen)
-        nearer = [distance(cell, queen) < far for cell in cells]
-    else:
-        nearer = [bool(level > own_level) for level in ahead]
-    nestmates = ants_in_view(world, ant, turns)
-    view: dict[str, Any] = {
-        "carries": int(ant.carries),
-        "paper_state": more_cells(AHEAD, world, ant),
-        "codes": Vector(codes_seen(world, ant, turns)),
-        "levels": ahead,
-        "ants": Vector(0 if other is None else 1 + other.carries for other in nestmates),
-        "other_nest_ants": Vector(
-            int(seen and cell in world.ants and nestmate(world, ant, cell) is None)
-            for cell, seen in zip(cells, is_seen, strict=True)
-        ),
-        "nearer": Vector(
-            int(is_nearer and seen) for is_nearer, seen in zip(nearer, is_seen, strict=True)
-        ),
-        "strongest": type(own_level)(strongest_in_view(world, ant)),
-        "own_level": own_level,
-    }
-    for name in observation.reads:
-        trail = world.pheromones[name]
-        view[name], view[f"own_{name}"] = levels(trail, trail.rule.dense)
-    return SimpleNamespace(**view)
