@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Sequence
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +13,7 @@ from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, distance, neighbour
 from taichi_ants.reference.world_state import Level, Trail, WorldState
 from taichi_ants.rules.inputs import Vector
-from taichi_ants.task import Observation
+from taichi_ants.task import Observation, Traffic
 from taichi_ants.task.constants import EMPTY, FOOD, SEES_CUE, SEES_EMPTY, SEES_GOAL, SEES_OBSTACLE
 
 AHEAD = (-1, 0, 1)  # headings relative to the ant's: left, forward, right
@@ -123,6 +123,24 @@ def ants_seen(world: WorldState, ant: Ant) -> int:
         for there, code in zip(ants_in_view(world, ant), codes_seen(world, ant), strict=True)
     ]
     return _number([ant.carries, *codes], 5)
+
+
+def ways(
+    world: WorldState, ant: Ant, codes: Sequence[int], traffic: Traffic
+) -> tuple[list[bool], list[bool]]:
+    """Return which cells ahead an ant can enter, and which are nearer to its queen.
+
+    Only an ant with a compass knows the latter. `codes` are those of the cells as it sees them.
+    """
+    has_compass = world.has_compass(ant)
+    is_open = [code in (SEES_EMPTY, SEES_CUE) for code in codes]
+    nearer = [code == SEES_CUE and has_compass for code in codes]
+    for side, cell in enumerate(cells_in_view(ant)):
+        if cell in world.ants and side - 1 not in ant.misread:
+            nearer[side] = has_compass and is_better(world, ant, cell)
+            if traffic.shared and nestmate(world, ant, cell):
+                is_open[side] = ant.carries or traffic.follow
+    return is_open, nearer
 
 
 def trail_levels(world: WorldState, ant: Ant) -> int:
