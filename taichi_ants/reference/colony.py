@@ -83,13 +83,12 @@ class ReferenceColony:
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         self._make = partial(LEARNERS[training.learner], training, task.n_states)
-        kinds = self.castes or [Caste()]
-        n = self.slots if sharing == "independent" else len(queens_of(world)) * len(kinds)
+        n = self.slots if sharing == "independent" else len(queens_of(world)) * len(self.castes)
         tables = [q_values] * n
         if q_values is not None and q_values.ndim > 2:
             tables = list(q_values.reshape(n, *q_values.shape[-2:]))
         for number in range(n if sharing != "independent" else 0):
-            if (policy := kinds[number % len(kinds)].policy) is not None:
+            if (policy := self.castes[number % len(self.castes)].policy) is not None:
                 tables[number] = frozen_policy(policy, task.observation)
         # One for each slot if they are independent, else for each nest and caste.
         self.learners = [self._make(table) for table in tables]
@@ -100,14 +99,14 @@ class ReferenceColony:
 
     @property
     def castes(self) -> list[Caste]:
-        """The castes of the task, if any."""
-        return list(self.task.castes.values())
+        """The castes of the task, or one without settings."""
+        return list(self.task.castes.values()) or [Caste()]
 
     def table_of(self, ant: Ant | Transition) -> int:
         """Return the number of the table of an ant."""
         if self.sharing == "independent":
             return ant.slot
-        return ant.nest * max(1, len(self.castes)) + ant.caste
+        return ant.nest * len(self.castes) + ant.caste
 
     def _set_up(self) -> None:
         """Reset everything that lasts for one episode."""
@@ -123,7 +122,7 @@ class ReferenceColony:
         nests = [nest_of(self.start_world, number) for number in range(self.n_ants)]
         self.starting = Counter(nests)  # ants at the start by nest
         left = [
-            castes.castes_at_start(self.castes or [Caste()], nest, self.starting[nest])
+            castes.castes_at_start(self.castes, nest, self.starting[nest])
             for nest in range(len(self.world.queens))
         ]
         for number, (cell, heading) in enumerate(begin):
@@ -245,7 +244,7 @@ class ReferenceColony:
         return any(results)
 
     def _draw_action(self, ant: Ant, tick: int) -> int:
-        caste, choice = castes.caste_of(self.task, ant), self.task.choice
+        caste, choice = self.castes[ant.caste], self.task.choice
         for name in ("temperature", "k", "exponent"):
             if (number := getattr(caste, name)) is not None:
                 choice = replace(choice, **{name: number})
@@ -331,7 +330,7 @@ class ReferenceColony:
         same = ("slot", "number", "action", "executed", "reward", "event", "nest", "caste")
         for was, ant in pairs:
             terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
-            number, follows = self.table_of(ant), castes.caste_of(self.task, ant).policy is not None
+            number, follows = self.table_of(ant), self.castes[ant.caste].policy is not None
             learns = self.learns and not (follows and self.sharing == "shared")
             # After a delivery that terminates, the ant chooses at the start of its next tick.
             if learns and self.learners[number].draws_next_action and not terminated:
@@ -351,7 +350,7 @@ class ReferenceColony:
             if learns:
                 members[number].append((ant, step))
         for number, of_table in members.items():
-            learner, caste = self.learners[number], castes.caste_of(self.task, of_table[0][0])
+            learner, caste = self.learners[number], self.castes[of_table[0][0].caste]
             rate, discount = caste.learning_rate, caste.discount
             learner.learning_rate = np.float32(self.learning_rate if rate is None else rate)
             learner.discount = np.float32(self.training.discount if discount is None else discount)
