@@ -9,7 +9,7 @@ middle half of the runs (Agarwal et al. 2021). Each has two intervals:
 - Student's t. For the IQM it is the interval of Tukey and McLaughlin (1963).
 
 Tables and figures show the bootstrap interval. Verdicts on claims use the hull of both intervals,
-because each can be too short: a bootstrap of few seeds never exceeds its most extreme resample, and
+because each can be too short. A bootstrap of few seeds never exceeds its most extreme resample, and
 the t interval is a point if the middle half consists of ties.
 """
 

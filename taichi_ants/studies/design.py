@@ -188,7 +188,7 @@ def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[dict
 def seed_share(values: np.ndarray, names: Sequence[str]) -> float:
     """Return the share of the variance of means over seeds that the seeds make, 0 to 1.
 
-    What seeds still change in these means looks like an interaction of all settings. The share is
+    The change that seeds still make looks like an interaction of all settings. The share is
     estimated from the points that are drawn independently, the first and the last of each group.
     What a seed adds to all points alike does not count, because all points have the same seeds.
     Points at which a seed has no value do not count. Nan for one seed.

@@ -284,7 +284,7 @@ WRONG = [
     ({"place": {"what": "queen", "cells": [60, 61]}}, "a single cell for the queen"),
     ({"place": {"what": "rock", "cells": [60] * 400_001}}, "at most 400000 are allowed"),
     ({"task": {"pheromone.half_life": 9}}, "half_life` is 9.0; leave"),
-    ({"ants": 41}, "ants is 41"),
+    ({"ants": 41}, "because the capacity of this colony is 40"),
 ]
 
 

@@ -11,8 +11,8 @@ change.
 
 Random numbers come from the stream of (seed, STREAM_INTERVENTION, episode) of each world, in the
 order of the changes. Adding n ants draws n headings and, with several castes, n castes. Removing n
-of m living ants, or of those of a nest, draws a word of 64 bits for each of the m ants in the order
-of numbers, and removes the ants with the n smallest words.
+of m living ants, or of those of a nest, draws a word of 64 bits for each of the m ants in order.
+The n ants with the smallest words go.
 """
 
 from __future__ import annotations
