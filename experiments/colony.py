@@ -27,7 +27,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     import colony_findings as study
     import numpy as np
-    import report_page as page
     from colony_figures import draw_all
     from colony_findings import JOINT, WORLD_KINDS, WORLDS, Condition, Results
     from colony_limits import limits_of
@@ -39,6 +38,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.errors import count
     from taichi_ants.learners.policies import save_policy
     from taichi_ants.measures.finished import COLONY, Run, values_of
+    from taichi_ants.report import page
     from taichi_ants.settings import nested
     from taichi_ants.studies import command_line
     from taichi_ants.studies.command import planned, run_study

@@ -30,7 +30,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from paper.page import Example, Seen
     from paper.report import report
     from paper.table2 import example_name, examples, summarise, summarise_behaviours, table2
-    from report_page import made_facts, setting_facts
 
     from taichi_ants import AntsError, Task, TrainingConfig, files, learners, train, worlds
     from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
@@ -39,6 +38,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.files import archives
     from taichi_ants.learners.policies import save_policy
     from taichi_ants.measures.finished import LONE, Run, values_of
+    from taichi_ants.report.page import made_facts, setting_facts
     from taichi_ants.settings import all_of, nested
     from taichi_ants.studies import command_line
     from taichi_ants.studies.command import planned, run_study

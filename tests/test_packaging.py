@@ -51,8 +51,11 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
         (entries,) = [name for name in wheel.namelist() if name.endswith("entry_points.txt")]
         assert "taichi-ants = taichi_ants.commands:main" in wheel.read(entries).decode()
     page = {f"taichi_ants/viewer/{name}" for name in ("page.html", *STYLES, *SCRIPTS)}
+    templates = ("base.html", "odd.md", "parts.html")
+    others = ("report.css", "report.js")
+    page |= {f"taichi_ants/report/{name}" for name in (*templates, *others)}
     page |= {f"taichi_ants/live/{name}" for name in PARTS}
-    page |= {"taichi_ants/analysis/taichi_ants.mplstyle", "taichi_ants/report/odd.md"}
+    page |= {"taichi_ants/analysis/taichi_ants.mplstyle"}
     assert set(names) == sources("taichi_ants") | {"taichi_ants/py.typed"} | page
 
 

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from policy_sheet import policy_sheet
-from report_page import Picture, Player, Shown, Statement, Statements, fill
 
 from paper import comparison as paper
 from paper import figures, process, report
@@ -23,6 +22,7 @@ from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
 from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
+from taichi_ants.report.page import Picture, Player, Shown, Statement, Statements, fill
 from taichi_ants.studies.command_line import progress_bar
 from taichi_ants.studies.points import RunPoint
 from taichi_ants.task import Task

@@ -11,10 +11,10 @@ from pages import addresses, tables
 from paper.claims import claims_rows
 from paper.comparison import Variant
 from paper.page import Seen, comparison_page
-from report_page import signed
 from synthetic_comparison import subset
 
 from taichi_ants.analysis.tables import number
+from taichi_ants.report.page import signed
 
 
 def page_of(results: Results) -> str:

@@ -15,13 +15,13 @@ from paper.comparison import DYNA_P5, Comparison
 from paper.figures import draw_all
 from paper.page import Seen, comparison_page
 from paper.table2 import Line, summarise, table2
-from report_page import Picture, Player
 from synthetic_colony_study import build as build_study
 from synthetic_comparison import build, change, unchanged
 
 from taichi_ants import Colony, Task, TrainingConfig, rollout, worlds
 from taichi_ants.analysis.drawings import drawings
 from taichi_ants.learners.policies import trail_follower
+from taichi_ants.report.page import Picture, Player
 from taichi_ants.viewer import record_colony, record_trace
 
 FACTS = {"World": "the <paper's>", "Command": "compare.py --out 'a & b'"}

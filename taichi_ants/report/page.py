@@ -1,8 +1,4 @@
-"""The common parts of the report pages: templates, players, and tables.
-
-The templates in `pages/` share one style (`report.css`) and one script (`report.js`); the scripts
-of the viewer play the recordings.
-"""
+"""The common parts of the report pages: templates, players, and tables."""
 
 from __future__ import annotations
 
@@ -21,7 +17,7 @@ from taichi_ants.analysis.tables import number
 from taichi_ants.report.odd import in_words
 from taichi_ants.viewer.page import Recording, content_policy, part
 
-_PAGES = Path(__file__).with_name("pages")
+_HERE = "taichi_ants.report"
 # Scripts of the viewer: the data of a recording, the picture of the world, and the playback.
 _PLAYING = ("history.js", "stage.js", "timeline.js")
 
@@ -36,17 +32,17 @@ def signed(text: Any) -> Any:
 
 def fill(template: Path, **parts: Any) -> str:
     """Return a page as HTML from a file that extends base.html; text in `parts` is escaped."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
     how: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
     how |= {"finalize": signed, "undefined": StrictUndefined}
-    style = part("colours.css") + (_PAGES / "report.css").read_text("utf-8")
-    script = "\n".join([*map(part, _PLAYING), (_PAGES / "report.js").read_text("utf-8")])
+    style = part("colours.css") + part("report.css", _HERE)
+    script = "\n".join([*map(part, _PLAYING), part("report.js", _HERE)])
     shared = {"style": style, "script": script}
     shared["policy"] = content_policy(f"\n{script}\n", f"\n{style}\n")
     parts |= {name: Markup(text) for name, text in shared.items()}
-    page = Environment(loader=FileSystemLoader(_PAGES), **how).from_string(
+    page = Environment(loader=PackageLoader("taichi_ants", "report"), **how).from_string(
         template.read_text(encoding="utf-8")
     )
     return page.render(**parts)
