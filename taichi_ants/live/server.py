@@ -374,8 +374,6 @@ class SessionServer:
 
     def _show(self, frame: bytes) -> None:
         """Send a frame to all pages except those that are behind."""
-        if new_names := self.session.recorder.new_names():
-            self._send(_message("names", names=new_names))
         for page in self.pages:
             page.show(frame)
 
