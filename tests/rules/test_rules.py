@@ -29,7 +29,7 @@ from taichi_ants.rules import pick, registry
 from taichi_ants.rules.inputs import KINDS
 from taichi_ants.task import Choice, Observation, observations
 from taichi_ants.task.model import Model
-from taichi_ants.task.observations import registry as seen
+from taichi_ants.task.observations import observation as seen
 from taichi_ants.testing import check_observation, check_rule
 
 

@@ -23,7 +23,7 @@ from taichi_ants.task import (
     Traffic,
     observations,
 )
-from taichi_ants.task.observations import Observation, registry
+from taichi_ants.task.observations import Observation, observation
 
 
 def test_the_defaults_are_the_rules_of_the_world():
@@ -61,7 +61,7 @@ def test_a_task_can_be_written_as_json():
 
 @pytest.fixture
 def _no_observation_stays(monkeypatch):
-    monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
+    monkeypatch.setattr(observation.OBSERVATIONS, "yours", dict(observation.OBSERVATIONS.yours))
 
 
 def always_zero(view):
