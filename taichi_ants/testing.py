@@ -13,8 +13,7 @@ from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features import FEATURES
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.rules import Rule
-from taichi_ants.settings import declared
+from taichi_ants.rules.rule import Rule, drawn_parameters
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.field import TRAIL
@@ -138,12 +137,7 @@ def _task(rule: Rule, seed: int) -> Task:
 
     Kernels are compiled for two tasks only, with one nest and with two; others differ in numbers.
     """
-    rng, drawn, numbers = np.random.default_rng([seed, 17]), seed % 2, {}
-    for setting in declared(rule.settings):
-        least, most = setting.rule.least, setting.rule.most
-        if least is not None and most is not None and rng.random() < 0.5:
-            value = float(rng.uniform(least, most))
-            numbers[setting.name] = round(value) if setting.kind is int else value
+    drawn, numbers = seed % 2, drawn_parameters(rule, np.random.default_rng([seed, 17]))
     settings: dict = {"rules": {rule.name: numbers}}
     for feature in FEATURES:
         if any(name in rule.inputs for name in feature.inputs):

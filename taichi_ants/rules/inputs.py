@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from taichi_ants.features import INPUTS
@@ -122,29 +122,17 @@ class Vector(tuple):
         return super().__getitem__(int(k))
 
 
-def drawn(inputs: Mapping[str, Input], n: int) -> Iterator[dict[str, Any]]:
-    """Yield n drawn sets of inputs by name: floats, and Vectors of floats."""
+def values_shown(values: Mapping[str, Any]) -> str:
+    """Return the values of the arguments of a rule for a message."""
+    return ", ".join(f"{name}={value}" for name, value in values.items())
+
+
+def drawn(rng: np.random.Generator, name: str, length: int = 0) -> Any:
+    """Return a value that an input of this name can have: a float, or a Vector of floats."""
     import numpy as np
 
-    rng = np.random.default_rng(0)
-    for _ in range(n):
-        yield {
-            name: Vector(_drawn(rng, name) for _ in range(read.length))
-            if read.length
-            else _drawn(rng, name)
-            for name, read in inputs.items()
-        }
-
-
-def values_shown(*values: Mapping[str, Any]) -> str:
-    """Return the values of inputs and parameters for a message."""
-    return ", ".join(f"{name}={value}" for numbers in values for name, value in numbers.items())
-
-
-def _drawn(rng: np.random.Generator, name: str) -> float:
-    """Return a value that an input of this name, or an entry of it, can have."""
-    import numpy as np
-
+    if length:
+        return Vector(drawn(rng, name) for _ in range(length))
     if name in _MOST:
         return float(rng.integers(_MOST[name] + 1))
     if name in ("random", "random_2", "epsilon", "trait"):

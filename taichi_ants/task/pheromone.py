@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeVar
 
-from taichi_ants.rules.registry import registered, words
-from taichi_ants.rules.rule import BUILT_IN, Rule
+from taichi_ants.rules.rule import BUILT_IN, Rule, registered, words
 from taichi_ants.settings import Setting, Settings
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 

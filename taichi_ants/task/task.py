@@ -15,8 +15,7 @@ from taichi_ants.features.castes import ALL, NOTHING, Caste, shares_in
 from taichi_ants.features.labour import Labour
 from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
-from taichi_ants.rules.registry import registered, words
-from taichi_ants.rules.rule import Parameters, Rule
+from taichi_ants.rules.rule import Parameters, Rule, registered, words
 from taichi_ants.settings import Named, Setting, Settings, declared
 from taichi_ants.task import observations
 from taichi_ants.task.choice import Choice

@@ -117,7 +117,7 @@ def test_policies_can_vary(sweep):
 
 
 def test_parameters_of_a_rule_vary_without_a_table(sweep, monkeypatch):
-    monkeypatch.setattr(rules.registry.RULES, "yours", {})
+    monkeypatch.setattr(rules.rule.RULES, "yours", {})
     rules.register("evaporation")(weaker)
     text = FILE.replace("[vary]", '[task]\npheromone.evaporation = "weaker"\n\n[vary]')
     text += "task.rules.weaker.rate = [0.1, 0.5]\n"

@@ -25,8 +25,9 @@ from taichi_ants import (
 from taichi_ants.engines import own_rules as own_rules_of_kernels
 from taichi_ants.interventions import SetTask
 from taichi_ants.reference import own_rules
-from taichi_ants.rules import pick, registry
+from taichi_ants.rules import pick
 from taichi_ants.rules.inputs import KINDS
+from taichi_ants.rules.rule import RULES
 from taichi_ants.task import Choice, Observation, observations
 from taichi_ants.task.model import Model
 from taichi_ants.task.observations import observation as seen
@@ -36,7 +37,7 @@ from taichi_ants.testing import check_observation, check_rule
 @pytest.fixture
 def clean(monkeypatch):
     """Forget the rules that a test registers."""
-    monkeypatch.setattr(registry.RULES, "yours", dict(registry.RULES.yours))
+    monkeypatch.setattr(RULES, "yours", dict(RULES.yours))
 
 
 def test_a_task_names_rules_and_their_parameters():
@@ -274,7 +275,7 @@ def wrong_twin(level):
 
 def test_a_rule_that_differs_from_its_twin_is_refused(clean):
     rules.register("evaporation")(same)
-    registry.RULES.yours["same"] = replace(rules.get("same"), function=wrong_twin)
+    RULES.yours["same"] = replace(rules.get("same"), function=wrong_twin)
     check = check_rule("same", inputs=50)
     assert "but its Python function" in check.difference
     assert str(check).startswith("same: 50 drawn inputs and 0 ticks")
