@@ -10,14 +10,13 @@ from taichi_ants.errors import AntsError
 from taichi_ants.features.feature import ANT, CASTE, Array, Feature, State, Task
 from taichi_ants.features.labour import Threshold
 from taichi_ants.features.life import Ticks
+from taichi_ants.grid.constants import MAX_CASTES, MAX_NESTS, TRAIL
 from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
     import numpy as np
 
-TRAIL = "trail"
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
-MAX_CASTES, MAX_NESTS = 16, 7
 Rate = Annotated[float | None, Setting(least=0, most=1)]
 Number = Annotated[int | None, Setting(least=0)]
 Temperature = Annotated[float | None, Setting(least=1e-6, most=1e6)]
@@ -30,10 +29,8 @@ class Caste(Settings, path="task.castes.NAME"):
     """A caste of ants, for colonies only.
 
     Ants of a caste share a table of action values, and can have their own numbers. None means that
-    they have those of the task, or of the training. A caste has a `share` of the ants of each nest,
-    or a number of `ants`; castes without both divide the remaining share equally. With a `policy`,
-    the ants of the caste follow it and do not learn. `threshold` can also be a number, which is a
-    fixed threshold.
+    they have those of the task, or of the training. Castes without `share` and `ants` divide the
+    remaining share equally. `threshold` can also be a number, which is a fixed threshold.
     """
 
     sentences: ClassVar[dict[str, str]] = {

@@ -54,11 +54,7 @@ _NONE, _FIXED, _UNIFORM, _NORMAL, _LOGNORMAL = range(len(DISTRIBUTIONS))
 class Labour(Settings, path="task.labour"):
     """The rule by which ants start and stop foraging; by default, they always forage.
 
-    With "thresholds", after Bonabeau, Theraulaz and Deneubourg (1996), each nest has a stimulus. It
-    rises by `demand` in each tick and falls by `relief` with each delivery, but not below 0. An
-    idle ant with the threshold t starts foraging with the probability s^n / (s^n + t^n) per tick,
-    for a stimulus s and n = `exponent`. A forager without food next to its queen becomes idle with
-    the probability `stop_probability` per tick. See `docs/colony.md`.
+    `sentences` describe the rule "thresholds". See `docs/colony.md`.
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -100,14 +96,7 @@ class Labour(Settings, path="task.labour"):
 
 @dataclass(frozen=True)
 class Threshold(Settings, path="task.castes.NAME.threshold"):
-    """The distribution of the response thresholds of a caste; by default, it has none.
-
-    - "fixed": all ants have the threshold `value`.
-    - "uniform": thresholds lie between `value` - `spread` and `value` + `spread`.
-    - "normal": `value` is the mean and `spread` the standard deviation. Values below 0 are drawn
-      again.
-    - "lognormal": `value` is the median and `spread` the standard deviation of the logarithm.
-    """
+    """The distribution of the response thresholds of a caste, by default none; see the module."""
 
     distribution: Annotated[
         Distribution,

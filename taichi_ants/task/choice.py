@@ -17,17 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Choice(Settings, path="task.choice"):
-    """The rule by which ants choose actions.
+    """The rule by which ants choose actions; `sentences` describe the built-in ones.
 
-    - "greedy" takes an action with the largest value, and breaks ties at random.
-    - "softmax" takes action a with a probability proportional to exp(Q(s, a) / temperature).
-    - "deneubourg" needs no action values. The ant gives at the queen, picks up food in view, and
-      otherwise enters an open cell ahead with a probability proportional to (k + level)^exponent,
-      after Deneubourg et al. (1990). See `docs/colony.md`. Only colonies support it. Levels are
-      those of the outbound cue; for ants with food, of `carriers_follow` or a homing pheromone.
-    - Other names are those of your rules, see `taichi_ants.rules`. Only colonies support them.
-
-    With "greedy" and "softmax", ants also explore: with probability epsilon, any action is taken.
+    Only colonies support "deneubourg", which needs no action values, and the names of your rules,
+    see `taichi_ants.rules`. "deneubourg" compares levels of the outbound cue; for ants with food,
+    those of `carriers_follow` or a homing pheromone. See `docs/colony.md`.
     """
 
     sentences: ClassVar[dict[str, str]] = {

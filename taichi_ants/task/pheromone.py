@@ -26,19 +26,10 @@ Level = Annotated[
 
 @dataclass(frozen=True)
 class Pheromone(Settings, path="task.pheromone"):
-    """The rules by which trails are laid, evaporate and spread.
+    """The rules by which trails are laid, evaporate and spread; `sentences` describe the values.
 
-    - Evaporation "linear" lowers a trail by 1 per tick. "exponential" halves it every `half_life`
-      ticks, and removes it below 1.
-    - Each neighbour gets a sixth of the share `diffusion`, except that the parts for obstacles and
-      for cells outside the world stay.
-    - By `deposit`, an ant with food changes the trail of its cell. "set" sets it to `level`. "add"
-      adds `level`, up to `cap`. "fading" raises it to `level` minus `slope` for each tick for which
-      the ant has carried food; such trails rise towards food if `slope` exceeds the evaporation.
-    - Other names of `evaporation` and `deposit` are those of your rules, see `taichi_ants.rules`.
-    - By `view`, an ant without food sees trails of at least 1 on empty cells as T. "half" requires
-      at least half the level of the strongest in view, "strongest" the same level.
-      "strongest_under_carriers" also compares with trails under ants with food.
+    Other names of `evaporation` and `deposit` are those of your rules, see `taichi_ants.rules`.
+    Trails that fade rise towards food if `slope` exceeds the evaporation.
     """
 
     sentences: ClassVar[dict[str, str]] = {

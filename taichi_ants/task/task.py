@@ -20,10 +20,9 @@ from taichi_ants.settings import Named, Setting, Settings, declared
 from taichi_ants.task import observations
 from taichi_ants.task.choice import Choice
 from taichi_ants.task.field import COMPASS, TRAIL, Field
-from taichi_ants.task.food import Food
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
-from taichi_ants.task.rewards import Rewards
+from taichi_ants.task.rewards import Food, Rewards
 
 Delivery = Literal["terminates", "truncates"]
 # Settings of castes that need a table of action values, or certain rules of choice.
@@ -330,9 +329,11 @@ class Task(Settings, path="task"):
         return tuple(sorted({self.cues_of(caste) for caste in self.castes.values()}))
 
     @classmethod
+    @cache
     def named(cls) -> Mapping[str, Task]:
         """Return the named tasks: "paper", "fetching", "foraging" and "queueing"."""
-        return _named()
+        built = (paper, fetching, foraging, queueing)
+        return MappingProxyType({function.__name__: function() for function in built})
 
     @property
     def sees(self) -> Observation:
@@ -415,9 +416,3 @@ def fetching() -> Task:
 def paper() -> Task:
     """Return the paper's task, which is the default everywhere."""
     return Task()
-
-
-@cache
-def _named() -> Mapping[str, Task]:
-    built = (paper, fetching, foraging, queueing)
-    return MappingProxyType({function.__name__: function() for function in built})

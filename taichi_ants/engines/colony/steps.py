@@ -61,9 +61,11 @@ from taichi_ants.task.constants import (
 )
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import OCCASIONS
-from taichi_ants.task.rules import conflicts, noise, vision
+from taichi_ants.task.rules import conflicts, vision
 from taichi_ants.task.rules.actions import (
     MOVES,
+    can_give,
+    heading_after_delivery,
     is_open,
     move_event,
     step_around,
@@ -71,7 +73,6 @@ from taichi_ants.task.rules.actions import (
     turn_round,
     turned_by,
 )
-from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
 from taichi_ants.task.rules.policy import (
     attraction,
     best_actions,
@@ -113,7 +114,7 @@ def observe_by(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, 
         paper_state = see(c, v, cues, w, ant, tick)
         state = paper_state
         if ti.static(v.misreads):
-            state, c.streams[ant] = noise.misread_paper_state(
+            state, c.streams[ant] = vision.misread_paper_state(
                 paper_state, c.streams[ant], v.at["see"], ant_view(c, v, w, ant)
             )
     elif trait(c.carries, ant) == 1:  # compiled twice, each time without what the other load needs
@@ -129,7 +130,7 @@ def observe_with(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant
     view = view_around(c, v, cues, w, ant, carries, tick)
     paper_state = view.paper_state  # the true one
     if ti.static(v.misreads):
-        c.streams[ant] = noise.misread_view(
+        c.streams[ant] = vision.misread_view(
             view, v.observation, c.streams[ant], v.at["see"], ant_view(c, v, w, ant)
         )
     return paper_state, v.encode(view)
@@ -264,7 +265,7 @@ def read_fields(c: ti.template(), v: ti.template(), view: ti.template(), k, inde
     """Set the levels of cell number k of a view in the pheromones that the observation reads."""
     for i in ti.static(range(len(v.reads))):
         level = level_of(ti.static(v.field(c, v.reads[i])), index, tick)
-        noise.entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
+        vision.entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
 
 
 @ti.func
