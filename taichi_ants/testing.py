@@ -1,4 +1,4 @@
-"""Checks of rules, observations and learners that you wrote."""
+"""Checks of rules and observations that you wrote; `taichi-ants check` checks learners, too."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants import learners, rules, runtime, worlds
+from taichi_ants import rules, runtime, worlds
 from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.engines.own_rules import difference
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features import FEATURES
 from taichi_ants.learners.config import TrainingConfig
@@ -16,13 +17,17 @@ from taichi_ants.reference import ReferenceColony
 from taichi_ants.rules.rule import Rule, drawn_parameters
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.task.field import TRAIL
+from taichi_ants.task.field import OCCASIONS, TRAIL
 from taichi_ants.worlds import World
 
 SEEDS, TICKS = 6, 60
-__all__ = ["RuleCheck", "check_learner", "check_observation", "check_rule"]
+__all__ = ["RuleCheck", "check_observation", "check_rule"]
 __dir__ = __all__.copy  # completion lists only public names
-_LAID = ("with_food", "without_food", "always", "dead_end", "failed_pick_up")
+# Of ants: views of a colony, and the same in the reference.
+_COMPARED = {
+    **{"headings": "heading", "carrying": "carries", "paper_states": "paper_state"},
+    **{"states": "state", "actions": "action", "events": "event", "rewards": "reward"},
+}
 
 
 class RuleCheck(NamedTuple):
@@ -65,8 +70,6 @@ def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
     Raises:
         AntsError: There is no rule of this name.
     """
-    from taichi_ants.engines.own_rules import difference
-
     rule = rules.get(name)
     checked_whole("inputs", inputs)
     runtime.start()
@@ -97,20 +100,6 @@ def check_observation(name: str) -> RuleCheck:
         return common.replace(observation=name, homing_cue=cue, noise=noise)
 
     return RuleCheck(name, 0, *_compared(task_of), observation.reads)
-
-
-def check_learner(name: str) -> str:
-    """Return the fault of a learner that learns from drawn steps, or an empty string.
-
-    This finds indices outside an array, and learners that write into the memory of other runs. It
-    restarts Taichi; an index that Taichi cannot check can end the process.
-
-    Raises:
-        AntsError: There is no learner of this name.
-    """
-    from taichi_ants.engines.learner_check import fault_of
-
-    return fault_of(learners.get(name))
 
 
 def _compared(task_of: Callable[[int], Task]) -> tuple[int, str]:
@@ -147,7 +136,7 @@ def _task(rule: Rule, seed: int) -> Task:
     elif rule.kind == "reward":
         settings |= {"reward": rule.name, "homing_cue": ("compass", "trail")[drawn]}
     else:
-        second = {"deposited_when": _LAID[seed % len(_LAID)], rule.kind: rule.name}
+        second = {"deposited_when": [*OCCASIONS][seed % 5], rule.kind: rule.name}
         settings |= {"pheromone": {rule.kind: rule.name}, "fields": {"second": second}}
     return _common(rule.fields, drawn).replace(**settings)
 
@@ -190,16 +179,9 @@ def _difference(colony: Colony, plain: ReferenceColony) -> str:
     ours, grid = colony.snapshot(), colony.grid
     order = np.argsort(colony.numbers[0])
     ants = [plain.ants[slot] for slot in sorted(plain.ants, key=lambda n: plain.ants[n].number)]
-    pairs = {
-        "cells": (grid.cells(colony.cells[0, order]), [ant.cell for ant in ants]),
-        "headings": (colony.headings[0, order], [ant.heading for ant in ants]),
-        "loads": (colony.carrying[0, order], [ant.carries for ant in ants]),
-        "paper_states": (colony.paper_states[0, order], [ant.paper_state for ant in ants]),
-        "states": (colony.states[0, order], [ant.state for ant in ants]),
-        "actions": (colony.actions[0, order], [ant.action for ant in ants]),
-        "events": (colony.events[0, order], [ant.event for ant in ants]),
-        "rewards": (colony.rewards[0, order], [ant.reward for ant in ants]),
-    }
+    pairs = {"cells": (grid.cells(colony.cells[0, order]), [ant.cell for ant in ants])}
+    for view, name in _COMPARED.items():
+        pairs[view] = getattr(colony, view)[0, order], [getattr(ant, name) for ant in ants]
     ground = list(plain.world.ground)
     places = grid.index(np.array(ground, np.int64).reshape(-1, 3))
     for name, trail in plain.world.pheromones.items():

@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from itertools import chain
 
 from taichi_ants.studies import command_line
-from taichi_ants.studies.command_line import whole_number
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -23,9 +22,6 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "file", metavar="FILE", help="Python file with rules, observations or learners"
     )
-    many = whole_number(1, 1_000_000)
-    about = "number of drawn inputs of each rule"
-    parser.add_argument("--inputs", type=many, default=4000, metavar="N", help=about)
     settings, _ = parser.parse_given(arguments)
     return settings
 
@@ -50,7 +46,7 @@ def run(settings: argparse.Namespace) -> None:
             "one, for example with taichi_ants.rules.register."
         )
     has_fault = False
-    for line, fault in _results(new[0], new[1], new[2], settings.inputs):
+    for line, fault in _results(*new):
         print(line, flush=True)
         has_fault |= bool(fault)
     if has_fault:
@@ -58,14 +54,15 @@ def run(settings: argparse.Namespace) -> None:
 
 
 def _results(
-    rules: list[str], observations: list[str], learners: list[str], inputs: int
+    rules: list[str], observations: list[str], learners: list[str]
 ) -> Iterator[tuple[str, str]]:
     """Yield a line and a fault, or an empty string, for each name."""
-    from taichi_ants.testing import check_learner, check_observation, check_rule
+    from taichi_ants import learners as registry
+    from taichi_ants.engines.learner_check import fault_of
+    from taichi_ants.testing import check_observation, check_rule
 
-    of_rules = (check_rule(name, inputs) for name in rules)
-    for comparison in chain(of_rules, map(check_observation, observations)):
+    for comparison in chain(map(check_rule, rules), map(check_observation, observations)):
         yield str(comparison), comparison.difference
     for name in learners:
-        fault = check_learner(name)
+        fault = fault_of(registry.get(name))
         yield f"{name}: 2000 steps: {fault or 'no fault'}", fault
