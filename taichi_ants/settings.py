@@ -396,9 +396,13 @@ def settings_of_entry(group: DeclaredSetting, name: str) -> dict[str, DeclaredSe
     return {path: setting._replace(path=path) for path, setting in of_entry.items()}
 
 
-@cache
 def declared(cls: Any) -> tuple[DeclaredSetting, ...]:
     """Return the settings of a class or function: its fields or arguments with a `Setting`."""
+    return _read(cls)
+
+
+@cache
+def _read(cls: Any) -> tuple[DeclaredSetting, ...]:
     settings, hints = [], get_type_hints(cls, include_extras=True)
     for name, default in _defaults(cls):
         hint = hints.get(name)

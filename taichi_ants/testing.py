@@ -179,7 +179,9 @@ def _difference(colony: Colony, plain: ReferenceColony) -> str:
     ours, grid = colony.snapshot(), colony.grid
     order = np.argsort(colony.numbers[0])
     ants = [plain.ants[slot] for slot in sorted(plain.ants, key=lambda n: plain.ants[n].number)]
-    pairs = {"cells": (grid.cells(colony.cells[0, order]), [ant.cell for ant in ants])}
+    pairs: dict[str, tuple] = {
+        "cells": (grid.cells(colony.cells[0, order]), [ant.cell for ant in ants])
+    }
     for view, name in _COMPARED.items():
         pairs[view] = getattr(colony, view)[0, order], [getattr(ant, name) for ant in ants]
     ground = list(plain.world.ground)

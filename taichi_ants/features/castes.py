@@ -119,8 +119,8 @@ class Caste(Settings, path="task.castes.NAME"):
         return [name.strip() for name in self.lays.split(",")]
 
 
-def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
-    """Return the share of each caste in the ants of a nest that `ants` does not give to castes.
+def parts_in(castes: Mapping[str, Caste], nest: int) -> list[tuple[int, float]]:
+    """Return the `ants` of each caste of a nest, 0 without, and its share of all other ants there.
 
     AntsError if the nest has no caste, or shares do not add up to 1.
     """
@@ -137,18 +137,12 @@ def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
             f"the shares of `task.castes` in nest {nest} add up to {sum(shares):g}; they must add "
             "up to 1, or to less if another caste has neither `share` nor `ants`."
         )
-    equal = max(left, 0.0) / n_open if n_open else 0.0
-    return [
-        0.0
-        if caste.nest not in (None, nest) or caste.ants is not None
-        else (equal if caste.share is None else caste.share)
-        for caste in castes.values()
-    ]
-
-
-def _fixed_in(castes: Mapping[str, Caste], nest: int) -> list[int]:
-    """Return the number `ants` of each caste in a nest, 0 without one."""
-    return [(caste.ants or 0) * (caste.nest in (None, nest)) for caste in castes.values()]
+    equal, parts = max(left, 0.0) / max(n_open, 1), []
+    for caste in castes.values():
+        share = equal if caste.share is None else caste.share
+        part = (0, share) if caste.ants is None else (caste.ants, 0.0)
+        parts.append(part if caste.nest in (None, nest) else (0, 0.0))
+    return parts
 
 
 def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
@@ -160,15 +154,16 @@ def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
 
     AntsError if there are too few ants, or ants without a caste.
     """
-    shares, counts = shares_in(castes, nest), _fixed_in(castes, nest)
-    rest = n - sum(counts)
-    if rest < 0 or (rest > 0 and not any(shares)):
+    parts = parts_in(castes, nest)
+    given = sum(ants for ants, _ in parts)
+    rest = n - given
+    if rest < 0 or (rest > 0 and not any(share for _, share in parts)):
         raise AntsError(
-            f"the castes have {sum(counts)} ants in nest {nest}, but {n} ants start there; change "
+            f"the castes have {given} ants in nest {nest}, but {n} ants start there; change "
             "`ants` of a caste, or give a caste a share."
         )
-    quotas = [round(share * rest, 9) for share in shares]
-    counts = [ants + int(quota) for ants, quota in zip(counts, quotas, strict=True)]
+    quotas = [round(share * rest, 9) for _, share in parts]
+    counts = [ants + int(quota) for (ants, _), quota in zip(parts, quotas, strict=True)]
     order = sorted(range(len(quotas)), key=lambda i: int(quotas[i]) - quotas[i])
     for i in order[: n - sum(counts)]:
         counts[i] += 1
@@ -180,9 +175,9 @@ def chances_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[float]:
 
     That is the caste's share, or its `ants` divided by n.
     """
-    shares, fixed, most = shares_in(castes, nest), _fixed_in(castes, nest), max(n, 1)
-    rest = (n - sum(fixed)) / most if n else 1.0
-    return [ants / most + share * rest for ants, share in zip(fixed, shares, strict=True)]
+    parts, most = parts_in(castes, nest), max(n, 1)
+    rest = (n - sum(ants for ants, _ in parts)) / most if n else 1.0
+    return [ants / most + share * rest for ants, share in parts]
 
 
 def _columns(state: State) -> dict[str, np.ndarray]:

@@ -49,7 +49,6 @@ AGE = Feature(
     Life,
     switch="lifespan",
     uses=lambda task: any(one.lifespan is not None for one in (task.life, *task.castes.values())),
-    kills=True,
     arrays=(Array("age", ANT, "i4", "ages", "i4", "age", unit="ticks"),),
     of_castes={"lifespan": lambda task, caste: caste.lifespan or task.life.lifespan or -1},
 )

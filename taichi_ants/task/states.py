@@ -27,11 +27,6 @@ class State(NamedTuple):
     forward: int
     right: int
 
-    @property
-    def view(self) -> tuple[int, int, int]:
-        """The three codes in the order of moves: left, forward, right."""
-        return self.left, self.forward, self.right
-
 
 def state_from_index(index: int) -> State:
     """Return the state of index 64 * carries + 16 * left + 4 * forward + right, 0 to 127."""
@@ -57,16 +52,16 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
 state_name = name_of_codes(3, *CELL_LETTERS)
 
 
-def _can_occur(state: State) -> bool:  # see section 1.5 of the paper
-    queens, nearer = state.view.count(SEES_GOAL), state.view.count(SEES_CUE)
-    if not state.carries:
+def _can_occur(carries: bool, *view: int) -> bool:  # see section 1.5 of the paper
+    queens, nearer = view.count(SEES_GOAL), view.count(SEES_CUE)
+    if not carries:
         return True
     if queens:  # there is only one, and no cell is nearer to her than her neighbours
         return queens == 1 and nearer == 0
-    return not state.left == state.right == SEES_CUE
+    return not view[0] == view[2] == SEES_CUE
 
 
 # The 100 indices that can occur under the rules, ascending.
 REACHABLE_STATES: tuple[int, ...] = tuple(
-    index for index in range(N_STATES) if _can_occur(state_from_index(index))
+    index for index in range(N_STATES) if _can_occur(*state_from_index(index))
 )

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from taichi_ants.errors import shown
 from taichi_ants.features import FEATURES, probabilities, used_by
-from taichi_ants.features.castes import ALL, NOTHING, Caste, shares_in
+from taichi_ants.features.castes import ALL, NOTHING, Caste, parts_in
 from taichi_ants.features.labour import Labour
 from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
@@ -228,7 +228,7 @@ class Task(Settings, path="task"):
             yield from feature.faults(self)
         nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
         for nest in (nests or {0}) if self.castes else ():
-            shares_in(self.castes, nest)  # raises AntsError
+            parts_in(self.castes, nest)  # raises AntsError
         unused = [] if choice.needs_table else [*_OF_TABLES]
         unused += [name for name, rules in _OF_CHOICE.items() if choice.rule not in rules]
         for name, caste in self.castes.items():
@@ -309,7 +309,7 @@ class Task(Settings, path="task"):
     @property
     def ants_change(self) -> bool:
         """Whether ants are born or die."""
-        return self.life.births or any(feature.kills for feature in used_by(self))
+        return self.life.births or any("aged" in feature.hooks for feature in used_by(self))
 
     def cues_of(self, caste: Caste | None) -> tuple[int, int]:
         """Return the numbers of the outbound and the homing cue of a caste, or of the task."""
