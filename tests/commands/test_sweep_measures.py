@@ -20,7 +20,7 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.measures import registry
+from taichi_ants.measures.measure import MEASURES
 from taichi_ants.studies.points import EVALUATION_SEEDS
 from taichi_ants.studies.sweep import plan, sweep_of, tables
 from taichi_ants.task import Pheromone, Task
@@ -46,7 +46,7 @@ FROZEN = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 def sweep(tmp_path, capsys, monkeypatch):
     """Calls the command on a file of this text, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(registry.MEASURES, "yours", {})
+    monkeypatch.setattr(MEASURES, "yours", {})
 
     def called(text, *more):
         Path("my.toml").write_text(text, "utf-8")

@@ -9,7 +9,7 @@ import pytest
 
 from taichi_ants import AntsError, Colony, TrainingConfig, When, measures, summary, train, worlds
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.measures import registry
+from taichi_ants.measures.measure import MEASURES
 
 FROZEN = {"sharing": "frozen", "q_values": trail_follower()}
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
@@ -17,7 +17,7 @@ TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
 
 @pytest.fixture(autouse=True)
 def forget_others(monkeypatch):
-    monkeypatch.setattr(registry.MEASURES, "yours", {})
+    monkeypatch.setattr(MEASURES, "yours", {})
 
 
 def colony(world=None, ants=5, seeds=(0, 1, 2)) -> Colony:
