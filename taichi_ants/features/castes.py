@@ -58,39 +58,28 @@ class Caste(Settings, path="task.castes.NAME"):
 
     most_entries = MAX_CASTES
 
-    share: Annotated[
-        Rate, Setting("share of the ants of a nest that `ants` does not give to castes")
-    ] = None
+    share: Annotated[Rate, Setting("share of the ants of a nest, after `ants` of castes")] = None
     ants: Annotated[
-        Number,
-        Setting("number of ants in each nest at the start, instead of a share", most=1 << 24),
+        Number, Setting("ants in each nest at the start, instead of a share", most=1 << 24)
     ] = None
-    nest: Annotated[
-        Number, Setting("number of the nest that has the caste; off: each nest", most=MAX_NESTS - 1)
-    ] = None
+    nest: Annotated[Number, Setting("number of its nest; off: each nest", most=MAX_NESTS - 1)] = (
+        None
+    )
     policy: Annotated[
-        str | None,
-        Setting(
-            "policy file, or the name of a hand-written policy, that the ants follow; off: learn"
-        ),
+        str | None, Setting("policy file, or name of a hand-written policy, to follow; off: learn")
     ] = None
     epsilon: Annotated[Rate, Setting("constant exploration rate")] = None
     epsilon_spread: Annotated[
-        Rate,
-        Setting("half the range of the exploration rates of the ants around `epsilon`", most=0.5),
+        Rate, Setting("half the range of exploration rates around `epsilon`", most=0.5)
     ] = None
     learning_rate: Annotated[Rate, Setting("constant learning rate", least=1e-37)] = None
     discount: Annotated[Rate, Setting("discount factor")] = None
     temperature: Annotated[Temperature, Setting("temperature of the rule softmax")] = None
-    k: Annotated[
-        Attraction, Setting("attraction of a cell without a trail, for the rule deneubourg")
-    ] = None
-    exponent: Annotated[
-        Exponent, Setting("exponent of the attraction of a cell, for the rule deneubourg")
-    ] = None
-    lays: Annotated[
-        str, Setting("pheromones that the ants lay: all, none, or names separated by commas")
-    ] = ALL
+    k: Annotated[Attraction, Setting("attraction of a cell without a trail (deneubourg)")] = None
+    exponent: Annotated[Exponent, Setting("exponent of the attraction of a cell (deneubourg)")] = (
+        None
+    )
+    lays: Annotated[str, Setting("pheromones to lay: all, none, or names with commas")] = ALL
     outbound_cue: Annotated[
         str | None, Setting("pheromone that ants without food see as T; off: that of the task")
     ] = None

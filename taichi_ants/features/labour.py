@@ -78,9 +78,7 @@ class Labour(Settings, path="task.labour"):
         _DIVIDES,
     ] = None
     exponent: Annotated[
-        float | None,
-        Setting("exponent of the response to the stimulus; larger values make it steeper"),
-        Setting(least=0, most=20, usual=2.0, only=("rule", "thresholds")),
+        float | None, Setting("exponent of the response", least=0, most=20, usual=2.0), _DIVIDES
     ] = None
     stop_probability: Annotated[
         float | None,
@@ -99,10 +97,7 @@ class Threshold(Settings, path="task.castes.NAME.threshold"):
     """The distribution of the response thresholds of a caste, by default none; see the module."""
 
     distribution: Annotated[
-        Distribution,
-        Setting(
-            "distribution of thresholds over the ants of the caste; with none, they always forage"
-        ),
+        Distribution, Setting("distribution of the thresholds; none: the ants always forage")
     ] = "none"
     value: Annotated[
         Stimulus,

@@ -14,6 +14,8 @@ from taichi_ants.settings import Setting, Settings
 if TYPE_CHECKING:
     import numpy as np
 
+_CELLS = Setting(only=("rule", "deneubourg"))
+
 
 @dataclass(frozen=True)
 class Choice(Settings, path="task.choice"):
@@ -49,19 +51,14 @@ class Choice(Settings, path="task.choice"):
     k: Annotated[
         Attraction,
         Setting("attraction of a cell without a trail", unit="units of trail level"),
-        Setting(usual=20.0, only=("rule", "deneubourg")),
+        Setting(usual=20.0),
+        _CELLS,
     ] = None
     exponent: Annotated[
-        Exponent,
-        Setting("exponent of the attraction of a cell; larger values follow stronger trails more"),
-        Setting(usual=2.0, only=("rule", "deneubourg")),
+        Exponent, Setting("exponent of the attraction of a cell", usual=2.0), _CELLS
     ] = None
     carriers_follow: Annotated[
-        str | None,
-        Setting(
-            "pheromone whose levels ants with food and a compass compare; none: the outbound cue"
-        ),
-        Setting(only=("rule", "deneubourg")),
+        str | None, Setting("pheromone that ants with food and a compass follow"), _CELLS
     ] = None
 
     @classmethod

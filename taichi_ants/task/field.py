@@ -60,10 +60,7 @@ class Field(Pheromone, path="task.fields.NAME"):
         **Pheromone.sentences,
     }
 
-    deposited_when: Annotated[
-        Laid,
-        Setting("occasions on which ants deposit; a cue that is never laid gives no direction"),
-    ] = "with_food"
+    deposited_when: Annotated[Laid, Setting("occasions on which ants deposit")] = "with_food"
 
     @property
     def counts_without_food(self) -> bool:

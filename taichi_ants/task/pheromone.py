@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeVar
 
 from taichi_ants.rules.rule import BUILT_IN, Rule, registered, words
-from taichi_ants.settings import Setting, Settings
+from taichi_ants.settings import Setting, Settings, Share
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 
 if TYPE_CHECKING:
@@ -62,16 +62,14 @@ class Pheromone(Settings, path="task.pheromone"):
         Setting("time in which a trail halves", unit="ticks", above=0, usual=50.0),
         Setting(only=("evaporation", "exponential")),
     ] = None
-    diffusion: Annotated[
-        float,
-        Setting("share of a trail that spreads to the six neighbours per tick", least=0, most=1),
-    ] = 0.0
+    diffusion: Annotated[Share, Setting("share of a trail that spreads to neighbours per tick")] = (
+        0.0
+    )
     deposit: Annotated[
         str,
         Setting(
-            "level that an ant lays on a cell: the cell's level becomes level (set), grows by "
-            "level (add), or rises to level minus slope per tick since the ant's load changed "
-            "(fading)",
+            "level of a cell with a new deposit: level (set), level more (add), or at least level "
+            "minus slope per tick since the ant's load changed (fading)",
             choices=partial(words, "deposit"),
         ),
     ] = "set"
@@ -91,9 +89,8 @@ class Pheromone(Settings, path="task.pheromone"):
     view: Annotated[
         View,
         Setting(
-            "lowest level that ants see as T or S: half of the highest level in view (half) or the "
-            "highest itself (strongest), also counting trails under ants with food "
-            "(strongest_under_carriers)"
+            "lowest level seen as a cue: half of the highest in view (half), or the highest "
+            "(strongest), also of those under ants with food (strongest_under_carriers)"
         ),
     ] = "half"
 

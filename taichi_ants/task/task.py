@@ -58,22 +58,15 @@ class Traffic(Settings, path="task.traffic"):
         "that move.",
     }
 
-    swap: Annotated[
-        bool,
-        Setting("allow carriers (ants with food) to change places with foragers (ants without)"),
-    ] = False
-    follow: Annotated[
-        bool, Setting("allow ants to enter a cell whose ant leaves in the same tick")
-    ] = False
+    swap: Annotated[bool, Setting("let ants with food change places with ants without")] = False
+    follow: Annotated[bool, Setting("let ants enter cells that ants leave in the same tick")] = (
+        False
+    )
     carriers_first: Annotated[
         bool, Setting("let carriers win cells that foragers want too; requires swap or follow")
     ] = False
     reward_pushed: Annotated[
-        bool,
-        Setting(
-            "reward a pushed ant as for its own move if it is pushed onto the cell that it wanted",
-            only=("swap", True),
-        ),
+        bool, Setting("reward a push onto the cell that the ant wanted", only=("swap", True))
     ] = False
 
     def _faults(self) -> Iterator[str]:
@@ -125,13 +118,9 @@ class Task(Settings, path="task"):
         "evaporation_in_evaluation=no": "Pheromones do not evaporate in the evaluation.",
     }
 
-    observation: Annotated[str, Setting("observation of an ant", choices=observations.names)] = (
-        "paper"
-    )
+    observation: Annotated[str, Setting("what an ant sees", choices=observations.names)] = "paper"
     rewards: Annotated[Rewards, Setting("reward of each event")] = Rewards()
-    pheromone: Annotated[
-        Pheromone, Setting("rules by which trails are laid, evaporate and spread")
-    ] = Pheromone()
+    pheromone: Annotated[Pheromone, Setting("rules of the trail")] = Pheromone()
     fields: Annotated[Named[Field], Setting("further pheromones, by name")] = field(
         default_factory=Named
     )
@@ -139,24 +128,15 @@ class Task(Settings, path="task"):
         str, Setting("pheromone that ants without food see as T: trail, or the name of a field")
     ] = TRAIL
     homing_cue: Annotated[
-        str,
-        Setting(
-            "what ants with food see as S: compass (nearer cells), trail, or the name of a field"
-        ),
+        str, Setting("what ants with food see as S: compass, trail, or the name of a field")
     ] = COMPASS
     traffic: Annotated[Traffic, Setting("rules for entering a cell with an ant on it")] = Traffic()
     turns_at_queen: Annotated[bool, Setting("turn ants around after a delivery")] = False
     delivery: Annotated[
-        Delivery,
-        Setting(
-            "end of an ant's episode at a delivery: as in Gymnasium, updates bootstrap only if it "
-            "truncates"
-        ),
+        Delivery, Setting("end of an episode at a delivery; updates bootstrap if it truncates")
     ] = "terminates"
     evaporation_in_training: Annotated[bool, Setting("evaporate trails while ants learn")] = False
-    evaporation_in_evaluation: Annotated[
-        bool, Setting("evaporate trails while ants follow a fixed policy")
-    ] = True
+    evaporation_in_evaluation: Annotated[bool, Setting("evaporate trails in evaluations")] = True
     life: Annotated[Life, Setting("changes of ants and food in colonies")] = Life()
     choice: Annotated[Choice, Setting("rule by which ants choose actions")] = Choice()
     noise: Annotated[Noise, Setting("failures of actions and observations")] = Noise()
@@ -170,9 +150,7 @@ class Task(Settings, path="task"):
     labour: Annotated[Labour, Setting("rule by which ants start and stop foraging")] = Labour()
     reward: Annotated[
         str,
-        Setting(
-            "rule of rewards: by_event (task.rewards), or the name of your rule; colonies only"
-        ),
+        Setting("rule of rewards: by_event (task.rewards), or yours; colonies only"),
         Setting(choices=partial(words, "reward")),
     ] = "by_event"
     rules: Annotated[
