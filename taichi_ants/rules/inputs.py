@@ -28,12 +28,18 @@ class RuleKind(NamedTuple):
     of_fields: tuple[str, ...] = ()  # the beginnings of inputs that read a field
 
 
-_CODES = "codes seen: 0 E, 1 O, 2 T or S, 3 F or Q; see the glossary"
 _CUE = "the ant's cue: the pheromone that an ant with its load follows"
+_TICK = Input("number of the tick in the episode, from 0")
 _OF_ANTS = {  # of all kinds of rules that ants follow
     "trait": Input("number of the ant from 0 to less than 1, which never changes"),
     **{name: read for name, (read, _) in INPUTS.items()},  # of features
-    "tick": Input("number of the tick in the episode, from 0"),
+    "tick": _TICK,
+}
+_OF_ACTIONS = {  # of rules that are called after an action
+    "carries": Input("1 if the ant has food after its action, else 0"),
+    "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
+    "paper_state": Input("the paper's state of the ant before its action, 0 to 127"),
+    **_OF_ANTS,
 }
 KINDS: dict[str, RuleKind] = {
     "choice": RuleKind(
@@ -41,7 +47,7 @@ KINDS: dict[str, RuleKind] = {
         *(0, 4, True),
         {
             "values": Input("action values of the ant's state; the ants then need a table", 5),
-            "codes": Input(_CODES, AHEAD),
+            "codes": Input("codes seen: 0 E, 1 O, 2 T or S, 3 F or Q; see the glossary", AHEAD),
             "levels": Input(f"levels of {_CUE}; 0 on obstacles, food and misread cells", AHEAD),
             "nearer": Input("1 if the cell is seen as S by the compass, else 0", AHEAD),
             "is_open": Input("1 if the ant can try to enter the cell, else 0", AHEAD),
@@ -61,33 +67,24 @@ KINDS: dict[str, RuleKind] = {
         {
             "level": Input("level of the cell before the deposit"),
             "carried": Input("ticks since the ant's load changed"),
-            "carries": Input("1 if the ant has food after its action, else 0"),
-            "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
-            "paper_state": Input("the paper's state of the ant before its action, 0 to 127"),
-            **_OF_ANTS,
+            **_OF_ACTIONS,
         },
         of_fields=(LEVEL,),
     ),
     "evaporation": RuleKind(
         "the level of a cell after the tick, before diffusion",
         *(0, MOST_LEVEL, False),
-        {
-            "level": Input("level of the cell before evaporation"),
-            "tick": Input("number of the tick in the episode, from 0"),
-        },
+        {"level": Input("level of the cell before evaporation"), "tick": _TICK},
     ),
     "reward": RuleKind(
         "the reward of the ant's action",
         *(-MOST_REWARD, MOST_REWARD, True),
         {
             "reward": Input("reward by `task.rewards` and `task.foods`"),
-            "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
-            "carries": Input("1 if the ant has food after its action, else 0"),
-            "paper_state": Input("the paper's state of the ant before its action, 0 to 127"),
             "next_paper_state": Input("the paper's state after the tick, 0 to 127"),
             "levels": Input(f"levels of {_CUE}, after the tick; 0 on obstacles and food", AHEAD),
             "level": Input("level of the ant's cue on its own cell, after the tick"),
-            **_OF_ANTS,
+            **_OF_ACTIONS,
         },
         of_fields=(LEVELS, LEVEL),
     ),
