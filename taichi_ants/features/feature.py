@@ -75,14 +75,6 @@ class Mark(NamedTuple):
         return np.rint(255 * shares).astype(np.uint8)
 
 
-class Measured(NamedTuple):
-    """A measure of the ants: a function of a `Snapshot`, the unit, and words."""
-
-    function: Function
-    unit: str
-    words: str
-
-
 class Input(NamedTuple):
     """An input of your rules: its meaning, and its number of entries if it is a vector, else 0.
 
@@ -154,7 +146,7 @@ class Feature:
         constants: A function of a colony that returns further arrays of its kernels.
         faults: A function of a task that yields what is wrong with it, as sentences.
         example: Settings of a task that uses the feature.
-        measures: Its measures by name.
+        measures: Its measures by name: a function of a `Snapshot`, the unit, and words.
         marks: The marks by which pages show its arrays of ants.
         hooks: Its hooks by the names of points.
         inputs: Inputs of your rules by name, with the functions of an ant that return them.
@@ -173,7 +165,7 @@ class Feature:
     constants: Callable[[State], Mapping[str, Any]] = lambda state: {}
     faults: Callable[[Task], Iterator[str]] = lambda task: iter(())
     example: Mapping[str, Any] = field(default_factory=dict)
-    measures: Mapping[str, Measured] = field(default_factory=dict)
+    measures: Mapping[str, tuple[Function, str, str]] = field(default_factory=dict)
     marks: tuple[Mark, ...] = ()
     hooks: dict[str, KernelFunction] = field(default_factory=dict)
     inputs: dict[str, tuple[Input, KernelFunction]] = field(default_factory=dict)
@@ -205,7 +197,7 @@ class Feature:
         """Register a function as the hook at a point, as a decorator."""
 
         def register(body: Function) -> KernelFunction:
-            given, expected = " ".join(signature(body).parameters), POINTS[point].arguments
+            given, expected = " ".join(signature(body).parameters), POINTS[point]
             if given != expected:
                 raise TypeError(f"{body.__name__} has ({given}), but {point} needs ({expected})")
             self.hooks[point] = KernelFunction(body)

@@ -32,7 +32,6 @@ from taichi_ants.features.feature import (
     Array,
     Feature,
     Mark,
-    Measured,
     Task,
     bits,
     numbers,
@@ -180,9 +179,7 @@ LABOUR = Feature(
         "castes": {"ants": {"threshold": {"distribution": "uniform", "value": 5.0, "spread": 5.0}}},
     },
     marks=(Mark("idle", "idle"),),
-    measures={
-        "foraging": Measured(_foraging, "", "share of the ants that forage, which are not idle")
-    },
+    measures={"foraging": (_foraging, "", "share of the ants that forage, which are not idle")},
 )
 
 

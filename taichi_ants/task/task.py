@@ -39,12 +39,9 @@ _CUES = {"outbound_cue": (), "homing_cue": (COMPASS,)}  # with cues that are not
 class Traffic(Settings, path="task.traffic"):
     """Rules for entering a cell with an ant on it; by default, as in the paper, no ant may.
 
-    With `swap` or `follow`, every ant that tries to move claims the cell ahead of it, unless a
-    rock, food, the queen or the edge of the world is there. The ant with the smallest hash wins;
-    with `carriers_first`, carriers win over foragers. See `docs/colony.md`. With `swap`, a carrier
-    that wins a cell changes places with a forager that neither enters a cell nor tries to pick up
-    food. The pushed ant gets the reward of a move onto an empty cell. With `follow`, all ants of a
-    queue move at once; a ring of ants that claim each other's cells does not move.
+    `sentences` describe the settings. A pushed ant gets the reward of a move onto an empty cell.
+    With `follow`, all ants of a queue move at once, but a ring of ants does not move. See
+    `docs/colony.md`.
     """
 
     sentences: ClassVar[dict[str, str]] = {
