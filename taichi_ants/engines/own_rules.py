@@ -14,6 +14,7 @@ import taichi as ti
 from taichi_ants import runtime
 from taichi_ants.arithmetic.numbers import exponential, logarithm, power
 from taichi_ants.engines.launch import last_line
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.rules.inputs import KINDS, values_shown
 from taichi_ants.rules.rule import TRIES, Rule, tries
 
@@ -92,17 +93,7 @@ def bounded_function(rule: Rule) -> Callable[..., Any]:
         inside = ti.select(inside < ti.f64(most), inside, ti.f64(most))
         return ti.cast(ti.floor(inside), ti.i32) if ti.static(is_whole) else inside
 
-    def rule_function(*arguments: Any) -> Any:
-        return bounded(function(*arguments))
-
-    return for_kernels(rule_function)
-
-
-def for_kernels(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a Python function that kernels call while they compile."""
-    # Taichi requires this attribute, with any value.
-    function._is_taichi_function = False
-    return function
+    return while_compiling(lambda *arguments: bounded(function(*arguments)))
 
 
 def difference(rule: Rule, n: int = TRIES) -> str:
@@ -140,6 +131,7 @@ def _results(rule: Rule, rows: np.ndarray, lengths: list[int]) -> np.ndarray:
     rows_type = ti.types.ndarray(dtype=ti.f64, ndim=2)
     results_type = ti.types.ndarray(dtype=ti.f64, ndim=1)
 
+    @while_compiling
     def of_row(inputs: Any, row: Any) -> Any:
         arguments, at = [], 0
         for length in lengths:
@@ -147,8 +139,6 @@ def _results(rule: Rule, rows: np.ndarray, lengths: list[int]) -> np.ndarray:
             arguments.append(ti.Vector(entries) if length else entries[0])
             at += max(1, length)
         return function(*arguments)
-
-    for_kernels(of_row)
 
     @ti.kernel
     def compute(inputs: rows_type, outputs: results_type):

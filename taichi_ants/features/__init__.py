@@ -6,11 +6,12 @@ from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.features.castes import CASTES
-from taichi_ants.features.feature import Array, Feature, KernelFunction, Task
+from taichi_ants.features.feature import Array, Feature, Task
 from taichi_ants.features.labour import LABOUR
 from taichi_ants.features.life import AGE
 from taichi_ants.features.noise import MISREAD, SLIP
 from taichi_ants.features.points import POINTS
+from taichi_ants.kernel_functions import KernelFunction
 
 if TYPE_CHECKING:
     import numpy as np

@@ -9,9 +9,9 @@ from taichi.lang.impl import subscript
 
 from taichi_ants.engines.colony import columns
 from taichi_ants.engines.colony.layout import COLUMNS, NestRow, WorldRow
-from taichi_ants.engines.own_rules import for_kernels
 from taichi_ants.features import numbers_of_castes
 from taichi_ants.features.feature import NEST
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.task.model import Model
 
 ANT, WORLD, CASTE = "ant", "world", "caste"
@@ -120,13 +120,13 @@ class Numbers:
         return subscript(None, self._array, self._names.index(name))
 
 
-@for_kernels
+@while_compiling
 def ant_view(c: Any, v: Any, w: Any, ant: Any) -> View:
     """Return the view of an ant."""
     return View(c, v, w, ant=ant)
 
 
-@for_kernels
+@while_compiling
 def nest_view(c: Any, v: Any, w: Any, nest: Any) -> View:
     """Return the view of a nest."""
     return View(c, v, w, nest=nest)

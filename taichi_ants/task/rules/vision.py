@@ -8,6 +8,7 @@ from typing import Any
 import taichi as ti
 
 from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.task.constants import EMPTY, SEES_CUE, SEES_OBSTACLE
 
 DEAD_END = SEES_OBSTACLE << 4 | SEES_OBSTACLE << 2 | SEES_OBSTACLE  # of an ant without food
@@ -134,13 +135,10 @@ def misread_paper_state(paper_state, random_state, hooks: ti.template(), ant: ti
     return state_index(paper_state >> 6, left, forward, right), last
 
 
+@while_compiling
 def entry_of(view: Any, name: str) -> Any:
     """Return a vector of a view by its name, while a kernel compiles."""
     return getattr(view, name)
-
-
-# Taichi requires this attribute, with any value, of Python functions that kernels call.
-entry_of._is_taichi_function = False  # type: ignore[attr-defined]
 
 
 @ti.func
