@@ -31,7 +31,7 @@ from taichi_ants.features import INPUTS
 from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.memory import values_of
 from taichi_ants.rules import Rule
-from taichi_ants.rules.inputs import AHEAD, LEVELS, field_of
+from taichi_ants.rules.inputs import AHEAD
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.rules.actions import step_towards
 from taichi_ants.task.rules.vision import code_in_view
@@ -48,7 +48,7 @@ class OwnRule:
     """
 
     def __init__(self, rule: Rule, first: int) -> None:
-        self.inputs, self.function = tuple(rule.inputs), bounded_function(rule)
+        self.inputs, self.function = rule.inputs, bounded_function(rule)
         self.places = range(first, first + len(rule.parameters))
 
     @while_compiling
@@ -68,13 +68,13 @@ class OwnRule:
             "random_2": lambda: _share(high_word(bits)),
             **_of_ants(c, v, w, ant, tick),
         }
-        return self.result(c, make | _of_levels(self.inputs, *sight, carries, tick))
+        return self.result(c, make | _of_levels(self.read_fields(v), *sight, carries, tick))
 
     @while_compiling
     def lay(self, c, v, w, ant, level, index, carried, carries, event, paper_state, tick):
         """Return a level, f64; see `trail.deposit`."""
-        make: Make = {name: partial(_level, c, v, name, index, tick) for name in self.inputs}
-        make |= {
+        make: Make = {
+            **{name: partial(_level, c, v, n, index, tick) for name, _, n in self.read_fields(v)},
             "level": lambda: level,
             "carried": lambda: carried,
             "carries": lambda: carries,
@@ -102,7 +102,12 @@ class OwnRule:
             **_of_ants(c, v, w, ant, tick),
         }
         sight = c, v, cues, w, ant, seen, seen
-        return self.result(c, make | _of_levels(self.inputs, *sight, carries, tick + 1))
+        return self.result(c, make | _of_levels(self.read_fields(v), *sight, carries, tick + 1))
+
+    def read_fields(self, v: Any) -> list[tuple[str, bool, int]]:
+        """Return the inputs that read a field: name, whether of the cells ahead, and its number."""
+        read = {name: one for name, one in self.inputs.items() if one.field}
+        return [(n, one.length > 0, v.field_names.index(one.field)) for n, one in read.items()]
 
     def result(self, c: Any, make: Make) -> Any:
         """Return the result of the rule, for functions that return its inputs."""
@@ -132,30 +137,27 @@ def _of_ants(c: Any, v: Any, w: Any, ant: Any, tick: Any) -> Make:
 
 
 def _of_levels(
-    names: Sequence[str], c: Any, v: Any, cues: Any, w: Any, ant: Any, seen: Any, paper_state: Any,
-    carries: Any, tick: Any,
+    fields: list[tuple[str, bool, int]], c: Any, v: Any, cues: Any, w: Any, ant: Any, seen: Any,
+    paper_state: Any, carries: Any, tick: Any,
 ) -> Make:  # fmt: skip
     """Return those inputs that are levels of the ant's cue or of fields, for rules of ants."""
 
-    def of_own_cell(name: str) -> Any:
-        return _level(c, v, name, _place(c, w, ant), tick)
+    def of_own_cell(number: int) -> Any:
+        return _level(c, v, number, _place(c, w, ant), tick)
 
     ahead = partial(_levels, c, v, cues, w, ant, seen=seen, paper_state=paper_state, tick=tick)
     levels: Make = {
         "levels": partial(ahead, number=-1),
         "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick),
     }
-    for name in filter(field_of, names):
-        if name.startswith(LEVELS):
-            levels[name] = partial(ahead, number=v.field_names.index(field_of(name)))
-        else:
-            levels[name] = partial(of_own_cell, name)
+    for name, is_ahead, number in fields:
+        levels[name] = partial(ahead if is_ahead else of_own_cell, number=number)
     return levels
 
 
-def _level(c: Any, v: Any, name: str, index: Any, tick: Any) -> Any:
-    """Return the level of a cell in the pheromone that an input names."""
-    return level_of(v.field(c, v.field_names.index(field_of(name))), index, tick)
+def _level(c: Any, v: Any, number: int, index: Any, tick: Any) -> Any:
+    """Return the level of a cell in a pheromone."""
+    return level_of(v.field(c, number), index, tick)
 
 
 @ti.func
