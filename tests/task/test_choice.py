@@ -105,16 +105,6 @@ def test_misread_cells():
     assert_counts((codes > 0).sum(axis=0), [0.343, 0.441, 0.189, 0.027])
 
 
-def test_a_task_without_noise_draws_nothing():
-    """A rule that has no effect on these ants leaves their random streams as they are."""
-    one = Colony(worlds.paper(), Task(), PLAIN, 3, 9)
-    two = Colony(worlds.paper(), Task(choice=Choice("greedy"), noise=Noise(0, 0)), PLAIN, 3, 9)
-    for colony in (one, two):
-        colony.begin_episode()
-        colony.tick(30)
-    assert one == two
-
-
 CELLS, SOFTLY, FROZEN = Task(choice="deneubourg"), Task(choice="softmax"), {"sharing": "frozen"}
 EXPECTED = TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0)
 REFUSED = [
