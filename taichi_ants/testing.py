@@ -59,16 +59,10 @@ class RuleCheck(NamedTuple):
 def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
     """Return the result of a comparison of a rule in kernels with its Python function.
 
-    First the results for drawn inputs are compared, then small drawn colonies that use the rule.
-    After each tick, cells, headings, loads, paper states, actions, events, rewards, states, levels
-    and action values must be equal in every bit.
-
-    Args:
-        name: The name of a registered rule.
-        inputs: The number of drawn inputs.
-
-    Raises:
-        AntsError: There is no rule of this name.
+    First the results for a number of drawn `inputs` are compared, then small drawn colonies that
+    use the rule. After each tick, cells, headings, loads, paper states, actions, events, rewards,
+    states, levels and action values must be equal in every bit. AntsError if there is no rule of
+    this name.
     """
     rule = rules.get(name)
     checked_whole("inputs", inputs)
@@ -83,13 +77,7 @@ def check_observation(name: str) -> RuleCheck:
     """Return the result of a comparison of an observation in kernels with its Python function.
 
     Small drawn colonies that use it are compared as in `check_rule`. The reference computes the
-    view of each ant by a separate implementation.
-
-    Args:
-        name: The name of a registered observation.
-
-    Raises:
-        AntsError: There is no observation of this name.
+    view by a separate implementation. AntsError if there is no observation of this name.
     """
     observation = observations.get(name)
     runtime.start()
