@@ -22,8 +22,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "file", metavar="FILE", help="Python file with rules, observations or learners"
     )
-    settings, _ = parser.parse_given(arguments)
-    return settings
+    return parser.parse_args(arguments)
 
 
 def run(settings: argparse.Namespace) -> None:

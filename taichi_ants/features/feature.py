@@ -76,13 +76,11 @@ class Mark(NamedTuple):
 class Input(NamedTuple):
     """An input of your rules: its meaning, and its number of entries if it is a vector, else 0.
 
-    `field` is the name of the field that it reads, if any. `by_deliveries` says whether it changes
-    with the deliveries of a tick before ants observe.
+    `by_deliveries` says whether it changes with the deliveries of a tick before ants observe.
     """
 
     meaning: str
     length: int = 0
-    field: str = ""
     by_deliveries: bool = False
 
 

@@ -96,9 +96,18 @@ def input_of(kind: str, name: str) -> Input | None:
     if name in KINDS[kind].inputs:
         return KINDS[kind].inputs[name]
     for start in KINDS[kind].of_fields:
-        if field := name.removeprefix(start) if name.startswith(start) else "":
-            return Input(f"level of {field}", AHEAD if start == LEVELS else 0, field)
+        if name.startswith(start) and name != start:
+            return Input(f"level of {name.removeprefix(start)}", AHEAD if start == LEVELS else 0)
     return None
+
+
+def field_of(name: str) -> str:
+    """Return the name of the field that an input of any kind reads, or an empty string."""
+    known = any(name in kind.inputs for kind in KINDS.values())
+    for start in (LEVELS, LEVEL):
+        if name.startswith(start) and not known:
+            return name.removeprefix(start)
+    return ""
 
 
 class Vector(tuple):

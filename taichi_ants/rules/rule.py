@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type
 
 from taichi_ants.errors import AntsError, check_one_of, shown, unusable
 from taichi_ants.registry import Registry
-from taichi_ants.rules.inputs import KINDS, Input, drawn, input_of, values_shown
+from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, input_of, values_shown
 from taichi_ants.rules.language import LanguageError, kernel_source
 from taichi_ants.settings import Setting, Settings, declared
 
@@ -72,7 +72,7 @@ class Rule:
     @property
     def fields(self) -> tuple[str, ...]:
         """The names of the fields that the rule reads."""
-        return tuple(dict.fromkeys(read.field for read in self.inputs.values() if read.field))
+        return tuple(dict.fromkeys(filter(None, map(field_of, self.inputs))))
 
     def result(self, inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> float:
         """Return the result of the Python function; it is limited to the range of the kind.
