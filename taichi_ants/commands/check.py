@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
 from itertools import chain
 
 from taichi_ants.studies import command_line
@@ -19,18 +18,19 @@ from taichi_ants.studies import command_line
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = command_line.Parser(__doc__)
-    parser.add_argument(
-        "file", metavar="FILE", help="Python file with rules, observations or learners"
-    )
+    about = "Python file with rules, observations or learners"
+    parser.add_argument("file", metavar="FILE", help=about)
     return parser.parse_args(arguments)
 
 
 def run(settings: argparse.Namespace) -> None:
     """Try everything that the file registers."""
     from taichi_ants import learners, rules
+    from taichi_ants.engines.learner_check import fault_of
     from taichi_ants.errors import AntsError
     from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import observations
+    from taichi_ants.testing import check_observation, check_rule
 
     registries = rules, observations, learners
     before = [set(registry.names()) for registry in registries]
@@ -45,23 +45,12 @@ def run(settings: argparse.Namespace) -> None:
             "one, for example with taichi_ants.rules.register."
         )
     has_fault = False
-    for line, fault in _results(*new):
-        print(line, flush=True)
+    for comparison in chain(map(check_rule, new[0]), map(check_observation, new[1])):
+        print(comparison, flush=True)
+        has_fault |= bool(comparison.difference)
+    for name in new[2]:
+        fault = fault_of(learners.get(name))
+        print(f"{name}: 2000 steps: {fault or 'no fault'}", flush=True)
         has_fault |= bool(fault)
     if has_fault:
         sys.exit(1)
-
-
-def _results(
-    rules: list[str], observations: list[str], learners: list[str]
-) -> Iterator[tuple[str, str]]:
-    """Yield a line and a fault, or an empty string, for each name."""
-    from taichi_ants import learners as registry
-    from taichi_ants.engines.learner_check import fault_of
-    from taichi_ants.testing import check_observation, check_rule
-
-    for comparison in chain(map(check_rule, rules), map(check_observation, observations)):
-        yield str(comparison), comparison.difference
-    for name in learners:
-        fault = fault_of(registry.get(name))
-        yield f"{name}: 2000 steps: {fault or 'no fault'}", fault
