@@ -24,7 +24,7 @@ from taichi_ants import (
 )
 from taichi_ants.engines import own_rules as own_rules_of_kernels
 from taichi_ants.interventions import SetTask
-from taichi_ants.reference import own_rules
+from taichi_ants.reference import observations as twins
 from taichi_ants.rules import pick
 from taichi_ants.rules.inputs import KINDS
 from taichi_ants.rules.rule import RULES
@@ -312,7 +312,7 @@ def test_an_observation_is_compared_with_the_reference(monkeypatch):
     observations.register(Observation("homely", 256, homely, reads=("B", "trail")))
     check = check_observation("homely")
     assert str(check) == "homely (reads the fields B and trail): 120 ticks of 2 colonies: equal"
-    monkeypatch.setattr(own_rules, "more_cells", lambda *_: 0)
+    monkeypatch.setattr(twins, "more_cells", lambda *_: 0)
     check = check_observation("homely")
     assert check.ticks < 120
     assert check.difference.startswith("seed 0, tick ")
