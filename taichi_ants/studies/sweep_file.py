@@ -102,7 +102,7 @@ class Base(NamedTuple):
             self._check_has_table(name)
             if isinstance(values, dict):
                 declaration = declaration_of(name, self.fixed)
-                of_points = (f.name for f in fields(KINDS[self.kind]) if "int" in str(f.type))
+                of_points = (s.name for s in declared(KINDS[self.kind]) if s.kind is int)
                 is_whole = name in ("world.seed", *of_points)
                 whole = declaration.kind is int if declaration else is_whole
                 axes[name] = Range.of(name, values, whole)
