@@ -95,9 +95,7 @@ class RunPoint:
     task: Task
     training: TrainingConfig
     episodes: Annotated[int, _TRAINING] = EPISODES
-    max_steps: Annotated[
-        int, Setting("largest length of an episode, which ends at a delivery", unit="ticks")
-    ] = EPISODE_STEPS
+    max_steps: Annotated[int, Setting("longest time to a delivery", unit="ticks")] = EPISODE_STEPS
     rollouts: Annotated[int, _EVALUATION] = 50
     policy: FixedPolicy | None = None
     kind: ClassVar[str] = "runs"
@@ -208,9 +206,7 @@ class ColonyPoint:
     training: TrainingConfig
     pool: tuple[World, ...] | None = None
     ants: Annotated[int, Setting("number at the start", unit="ants")] = 1
-    sharing: Annotated[str, Setting("whether ants learn into one table or into their own")] = (
-        "shared"
-    )
+    sharing: Annotated[str, Setting("whether ants learn into one table or their own")] = "shared"
     start: Annotated[str, Setting("start cells of ants that the world does not list")] = "nest"
     capacity: Annotated[int | None, Setting("largest number of living ants", unit="ants")] = None
     episodes: Annotated[int, _TRAINING] = 50
@@ -218,13 +214,9 @@ class ColonyPoint:
     rollouts: Annotated[int, _EVALUATION] = 4
     after: ColonyPoint | None = None
     policy: FixedPolicy | None = None
-    evaluation_epsilon: Annotated[float | None, Setting("exploration rate of the evaluation")] = (
-        None
-    )
+    evaluation_epsilon: Annotated[float | None, Setting("exploration rate in evaluation")] = None
     measures: tuple[str, ...] = ()
-    measure_every: Annotated[
-        int | None, Setting("time between two rows of series of measures", unit="ticks")
-    ] = None
+    measure_every: Annotated[int | None, Setting("time between measures", unit="ticks")] = None
     protocol: tuple[ProtocolEvent, ...] = ()
     during: Annotated[str, Setting("episodes in which the events happen")] = "evaluation"
     kind: ClassVar[str] = "colony"

@@ -28,7 +28,7 @@ from taichi_ants.task import Task
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = (  # keys that are not settings of points
-    *("kind", "seeds", "measures", "measure_every", "margin", "against", "vary"),
+    *("kind", "seeds", "measures", "measure_every", "against", "vary"),
     *(key.name for key in declared(Design)),
 )
 # Attributes of points that are not settings.
