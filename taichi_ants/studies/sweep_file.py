@@ -127,8 +127,7 @@ class Base(NamedTuple):
         not allowed, or there are too few episodes for a measure.
         """
         tree = nested(self.fixed | row)
-        named = [name for name in protocol.EVENTS if isinstance(tree.get(name), Mapping)]
-        events = {name: tree.pop(name) for name in named}
+        events = {n: tree.pop(n) for n in protocol.EVENTS if isinstance(tree.get(n), Mapping)}
         world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
         for part, table in zip(_PARTS, (world, task, training), strict=False):
             expect(part, table, Mapping)
