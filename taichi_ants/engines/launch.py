@@ -16,7 +16,6 @@ from taichi.types import ndarray_type
 
 from taichi_ants import runtime
 from taichi_ants.errors import AntsError
-from taichi_ants.subnormals import Flushing
 
 
 class Launch:
@@ -38,7 +37,7 @@ class Launch:
         self._context: Any
         self._pack: Any
         self._known: dict[str, Any] = {}  # the present values of the pack and the context
-        self._flushing = Flushing()
+        self._flushing = runtime.Flushing()
 
     def __call__(self, values: Mapping[str, Any]) -> None:
         """Launch with these values; names and types are always the same, arrays C-contiguous."""

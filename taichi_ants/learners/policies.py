@@ -24,7 +24,7 @@ from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, 
 from taichi_ants.task.states import TASK_NAMES
 
 ActionValues = npt.NDArray[np.float32]
-_KIND = Kind("policy", 2, "save_policy", most=1 << 26, foreign=True)
+_KIND = Kind("policy", 2, "save_policy", most=1 << 26)
 
 
 class Policy(NamedTuple):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from taichi_ants.errors import AntsError, expect, shown, whole
-from taichi_ants.files import inputs
+from taichi_ants.files import place_of
 from taichi_ants.registry import Registry
 from taichi_ants.settings import DeclaredSetting, declared, not_a_setting
 from taichi_ants.worlds.double_bridge import double_bridge
@@ -85,7 +85,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **settings: Any) 
             of = f"the world {shown(name_or_path)}"
             raise AntsError(f"`world.{name}` {not_a_setting(name, sorted(allowed), of)}")
     if builder is None:
-        if os.path.exists(inputs.place_of(name_or_path)):
+        if os.path.exists(place_of(name_or_path)):
             return load_map(name_or_path)
         raise WORLDS.unknown(os.fspath(name_or_path), "give the path of a map file that exists, ")
     world = builder(**settings, **({"seed": seed} if is_drawn(name_or_path) else {}))
