@@ -62,6 +62,7 @@ ODD = {
     "a state": lambda _: states.state_name(2**31),
     "a first value": lambda _: offline.fitted_q_iteration(data(), initial_q=None),
     "no first value": lambda _: offline.batch_q_learning(data(), initial_q=HUGE),
+    "an offline model's": lambda _: offline.model_based(data(), TABLE, initial_q="x"),
     "by run": lambda _: offline.fitted_q_iteration(data(), by_run=np.zeros(0)),
     "a penalty": lambda _: offline.pessimistic_q_iteration(data(), penalty=HUGE),
     "a label": lambda _: learners.label(["sarsa"]),

@@ -1,4 +1,4 @@
-"""The registry of worlds: functions that return a `World`, by name."""
+"""The registry of worlds: functions that return a `World`, by name; the paper's world."""
 
 from __future__ import annotations
 
@@ -13,9 +13,20 @@ from taichi_ants.registry import Registry
 from taichi_ants.settings import DeclaredSetting, declared, not_a_setting
 from taichi_ants.worlds.double_bridge import double_bridge
 from taichi_ants.worlds.open_world import far_piles, open_world
-from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.text_map import load_map
 from taichi_ants.worlds.world import World
+
+
+def paper() -> World:
+    """Return the paper's world: 271 cells, one food item, and a trail along the whole x axis."""
+    return World(
+        ranges=(10, 10, 10),
+        queen=(0, 9, 9),
+        foods=[(9, 0, 0)],
+        trails=[((i, 0, 0), 25) for i in range(-8, 9)],
+        ants=[((0, 8, 8), 0)],
+    )
+
 
 Builder = Callable[..., World]
 BUILT_IN: dict[str, Builder] = {

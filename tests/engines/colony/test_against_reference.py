@@ -14,7 +14,7 @@ from same_colonies import assert_equal, every_tick
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, learners, worlds
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, cells_in_view
+from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, cells_in_view
 from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import registry
@@ -218,7 +218,6 @@ def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
     """Drawn colonies whose ants observe two fields, in every tick."""
     monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
     monkeypatch.setitem(OBSERVATIONS, "levels", levels_seen)
-    monkeypatch.setitem(TURNS, "levels", AHEAD)
     observations.register(Observation("levels", 128, with_levels, reads=("a", "B")))
     hidden = shown = 0
     for seed in range(12):
