@@ -179,11 +179,7 @@ def test_figures_are_added_to_finished_results_without_new_runs(sweep, monkeypat
 WRONG = {
     "no kind": ('kind = "runs"', "", ["kind is None", "runs, colony"]),
     "no measure": (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
-    "unknown": (
-        "shaping =",
-        "shapings =",
-        ["`task.rewards.shapings` is not a setting; choose"],
-    ),
+    "unknown": ("shaping =", "shapings =", ["rewards.shapings` is not a setting; choose shaping"]),
     "unknown key of the file": ("seeds =", "seds =", ["'seds' is not a setting", "choose seeds"]),
     "other kind": ("rollouts", "ants", ["'ants' is not a setting of a sweep of kind 'runs'"]),
     "missing": ("discount = 0.9", "", ["training.discount is missing"]),

@@ -184,11 +184,7 @@ training.learning_rate = [0.1, 0.2]
         ("episodes = 0", "episodes = 2", ["'trail_follower'", "set episodes = 0"]),
         ('"trail_follower"', '"none.npz"', ["cannot read 'none.npz'"]),
         ('"entropy", "deliveries", "path_length"', '"per_ant"', ["a measure that has a series"]),
-        (
-            "[vary]",
-            "[task.fields.home]\n[vary]\ntask.fields.hom.level = [1]",
-            ["task.fields.hom; add"],
-        ),
+        ("[vary]", "[task.fields.a]\n[vary]\ntask.fields.b.level = [1]", ["no task.fields.b; add"]),
     ],
 )
 def test_mistakes_end_in_one_sentence(old, new, words, sweep):
