@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from taichi_ants.features.castes import CASTES
+from taichi_ants.features.castes import numbers_of_castes as numbers_of_castes
 from taichi_ants.features.feature import Array, Feature, KernelFunction, Task
 from taichi_ants.features.labour import LABOUR
 from taichi_ants.features.life import AGE
@@ -50,8 +51,3 @@ def arrays(per: str) -> Iterator[tuple[Feature, Array]]:
         for array in feature.arrays:
             if array.per == per:
                 yield feature, array
-
-
-def numbers_of_castes(features: tuple[Feature, ...]) -> dict[str, Any]:
-    """Return the numbers of castes that features declare, by name, in order."""
-    return {name: of for feature in features for name, of in feature.of_castes.items()}

@@ -149,6 +149,9 @@ class Feature:
         columns: A function of a colony that returns the arrays (W, ants) of ants that start, where
             these are not 0.
         constants: A function of a colony that returns further arrays of its kernels.
+        refusals: A function of a colony that yields why it cannot be, as sentences.
+        newborn: A function of a colony, a world, the nests (n,) of ants that an intervention adds,
+            and a function that draws n words. It returns their arrays (n,) where these are not 0.
         faults: A function of a task that yields what is wrong with it, as sentences.
         example: Settings of a task that uses the feature.
         measures: Its measures by name.
@@ -170,6 +173,8 @@ class Feature:
     fixed: Callable[[Caste], Any] = lambda caste: None
     columns: Callable[[State], Mapping[str, Any]] = lambda state: {}
     constants: Callable[[State], Mapping[str, Any]] = lambda state: {}
+    refusals: Callable[[State], Iterator[str]] = lambda state: iter(())
+    newborn: Callable[..., Mapping[str, Any]] = lambda state, w, nests, draw: {}
     faults: Callable[[Task], Iterator[str]] = lambda task: iter(())
     example: Mapping[str, Any] = field(default_factory=dict)
     measures: Mapping[str, Measured] = field(default_factory=dict)

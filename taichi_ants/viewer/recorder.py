@@ -16,6 +16,7 @@ from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.results import Trace
 from taichi_ants.errors import AntsError, count, expect
 from taichi_ants.features import used_by
+from taichi_ants.features.castes import update_weights_of
 from taichi_ants.features.feature import Feature, Mark
 from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
@@ -264,7 +265,7 @@ class Recorder:
         moved = self._tables().astype(np.float64).ravel()[pairs] - before.ravel()[pairs]
         _, pair, ants = np.unique(pairs, return_inverse=True, return_counts=True)
         castes = self.colony.castes[self.world, slots]
-        weights = self.colony.update_weights_of(castes, ants[pair])
+        weights = update_weights_of(self.colony, castes, ants[pair])
         values = np.full(len(moved), np.nan)
         errors[acted] = np.divide(moved, weights, out=values, where=weights > 0)
         return errors

@@ -29,7 +29,7 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
-from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, NestRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.errors import AntsError, count, entries_of, refuse
 from taichi_ants.grid.constants import (
@@ -69,6 +69,7 @@ class _World:
     def __init__(self, interventions: Interventions, w: int) -> None:
         self.all, self.w, self.colony = interventions, w, interventions.colony
         self.rows = self.colony.arrays["worlds"][:, w]
+        self.queen_cells = self.colony.queen_cells[w]  # a view, (nests,)
 
     def place(self, change: language.Place) -> Change:
         """Place rock or food; see `_put` and `_move_queen`."""
@@ -212,12 +213,6 @@ class _World:
         """Return a view of the world's part of an array."""
         return self.colony.part(name, self.w)
 
-    @property
-    def queen_cells(self) -> np.ndarray:
-        """A view of the cell of each nest's queen, (nests,)."""
-        n = self.colony.n_nests
-        return self.colony.arrays["nests"][NestRow.QUEEN_CELL, self.w * n : (self.w + 1) * n]
-
     def _living_slots(self, nest: int | None = None) -> np.ndarray:
         """Return the slots of the living ants, or those of a nest, in the order of numbers."""
         living = self.colony.living[self.w]
@@ -306,8 +301,8 @@ class _World:
 
     def _lay(self, cells: np.ndarray, level: int, number: int) -> None:
         """Set the levels of a pheromone in cells; 0 is the trail."""
-        clock = self.colony.trail_clock(self.w, number)
-        self.colony.stored_pheromone(self.w, number)[cells] = level + clock if level else 0
+        stored, clock = self.colony.stored_pheromone(self.w, number)
+        stored[cells] = level + clock if level else 0
 
     def _add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None) -> Change:
         """Put newborn ants of some nests on those of the cells that are empty."""
@@ -325,22 +320,18 @@ class _World:
         numbers = rows[WorldRow.NEXT_NUMBER] + np.arange(n)
         words = self.all.stream(self.w).bits(n) if heading is None else np.zeros(0, np.uint64)
         headings = choose(words >> np.uint64(32), N_HEADINGS) if heading is None else heading
-        castes: Any = 0
-        if len(colony.task.castes) > 1:
-            drawn = (self.all.stream(self.w).bits(n) >> np.uint64(32)) / 2.0**32
-            bounds = self.view("caste_chances").reshape(colony.n_nests, -1)[nests, :-1]
-            castes = np.count_nonzero(bounds <= drawn[:, None], axis=1)
         episode = int(colony.arrays["episodes"][self.w])
         born = (episode << 32) + numbers.astype(np.int64)
-        newborn = {
+        newborn: dict[str, Any] = {
             "cell": cells,
             "heading": headings,
             "number": numbers,
             "nest": nests,
-            "caste": castes,
             "stage": Stage.NEWBORN,
             "streams": stream_state(colony.seeds[self.w], STREAM_BORN, born),
         }
+        for feature in colony.model.features:
+            newborn |= feature.newborn(colony, self.w, nests, self.all.stream(self.w).bits)
         for name in colony.columns():
             self.view(name)[slots] = newborn[name] if name in newborn else COLUMNS[name].start
         ground[cells] = OBSTACLE | (ANT_STANDS - nests) << 4
@@ -467,16 +458,16 @@ class Interventions:
     def set_task(self, task: Task) -> None:
         """Set a task that differs only in settings that kernels read as numbers."""
         colony = self.colony
-        clocks = {
-            (world, number): colony.trail_clock(world, number)
-            for world in range(len(colony.worlds))
+        before = {
+            (w, number): colony.stored_pheromone(w, number)
+            for w in range(len(colony.worlds))
             for number, pheromone in enumerate(colony.pheromones)
             if not pheromone.dense
         }
         colony.set_task(task)
-        for which, clock in clocks.items():
-            stored = colony.stored_pheromone(*which)
-            stored[:] = np.where(stored > clock, stored - clock + colony.trail_clock(*which), 0)
+        for which, (stored, clock) in before.items():
+            _, now = colony.stored_pheromone(*which)
+            stored[:] = np.where(stored > clock, stored - clock + now, 0)
 
     def state(self) -> str:
         """Return a hash of the whole state; colonies with equal hashes behave identically."""

@@ -2,25 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import fields
 from enum import IntEnum, auto
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from taichi_ants.features import arrays
+from taichi_ants.features.castes import CASTES
 from taichi_ants.features.feature import ANT, Feature
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
+from taichi_ants.task.food import Food
 from taichi_ants.task.model import Model
 
 
 class Column(NamedTuple):
-    """An array with an entry for each slot: its value at the start, and the models that use it."""
+    """An array with an entry for each slot.
+
+    Attributes:
+        dtype: The type in kernels.
+        view: Its name as an attribute (W, capacity) of a colony; "" if it has none.
+        shown_as: The type of the attribute, which is a copy; "" for a writable view.
+        start: The value at the start of an episode, and where no ant is.
+        is_used: Whether a model needs it.
+        instead: The column that the attribute shows if this one is not used; "" for 0.
+    """
 
     dtype: type
+    view: str = ""
+    shown_as: str = ""
     start: int = 0
     is_used: Callable[[Model], bool] = lambda model: True
+    instead: str = ""
 
 
 def _uses(feature: Feature, model: Model) -> bool:
@@ -29,32 +44,41 @@ def _uses(feature: Feature, model: Model) -> bool:
 
 # Small values that each tick uses take one byte, which is a quarter of the memory traffic.
 COLUMNS = {
-    "cell": Column(np.int32),
+    "cell": Column(np.int32, "cells"),
     # Ticks since the pick-up of its food, or, if a field needs it, without food.
-    "carried": Column(np.int32),
-    "number": Column(np.int32, -1),  # -1 in a slot that was never used in this episode
+    "carried": Column(np.int32, "carried"),
+    # The number of its last ant; -1 in a slot that was never used in this episode.
+    "number": Column(np.int32, "numbers", start=-1),
     # The cell to enter or to take food from, else its own; later its previous cell.
     "want": Column(np.int32),
     # The state index, unless it is the paper's state.
-    "state": Column(np.int32, 0, lambda model: not model.sees_paper_state),
+    "state": Column(
+        *(np.int32, "states", "i4"),
+        is_used=lambda model: not model.sees_paper_state,
+        instead="paper_state",
+    ),
     # The reward of the last action, if rewards are by your own rule.
-    "reward": Column(np.int32, 0, lambda model: model.has_own_reward),
-    "heading": Column(np.int8),
-    "carries": Column(np.int8),
-    "stage": Column(np.int8),  # a `Stage`
-    "paper_state": Column(np.int8),  # which decides about actions and rewards
-    "event": Column(np.int8),  # the result of the last action, an `Event`
+    "reward": Column(np.int32, is_used=lambda model: model.has_own_reward),
+    "heading": Column(np.int8, "headings"),
+    "carries": Column(np.int8, "carrying", "bool"),
+    "stage": Column(np.int8, "stages"),  # a `Stage`
+    "paper_state": Column(np.int8, "paper_states"),  # which decides about actions and rewards
+    "event": Column(np.int8, "events"),  # the result of the last action, an `Event`
     # The last action, -1 before the first one; or the next one, if actions are given.
-    "action": Column(np.int8, -1),
+    "action": Column(np.int8, "actions", start=-1),
     # The last action as executed, if actions slip; else it is `action`.
-    "executed": Column(np.int8, -1, lambda model: model.slips),
+    "executed": Column(np.int8, "executed", "i1", -1, lambda model: model.slips, "action"),
     # The next action if it is drawn already, else -1.
-    "next_action": Column(np.int8, -1, lambda model: model.draws_next_action),
-    "nest": Column(np.int8, 0, lambda model: model.n_nests > 1),
+    "next_action": Column(
+        np.int8, "next_actions", start=-1, is_used=lambda model: model.draws_next_action
+    ),
+    "nest": Column(np.int8, "nests", "i4", is_used=lambda model: model.n_nests > 1),
     # The kind of the last food that it picked up.
-    "kind": Column(np.int8, 0, lambda model: model.n_kinds > 1),
+    "kind": Column(np.int8, "kinds", "i4", is_used=lambda model: model.n_kinds > 1),
     **{
-        array.name: Column(np.dtype(array.dtype).type, 0, partial(_uses, feature))
+        array.name: Column(
+            np.dtype(array.dtype).type, array.view, array.shown_as, 0, partial(_uses, feature)
+        )
         for feature, array in arrays(ANT)
     },
 }
@@ -138,28 +162,14 @@ class Barrier(IntEnum):
 GAVE_UP = -(2**40)  # added to OPENED when the first part gives up, which keeps the number
 
 
-class CasteRow(IntEnum):
-    """The first rows of `castes`, one column for each caste; numbers of features follow."""
-
-    EPSILON = 0  # -1 if it has that of the colony
-    EPSILON_SPREAD = auto()
-    LEARNING_RATE = auto()  # -1 if it has that of the colony
-    DISCOUNT = auto()
-    TEMPERATURE = auto()
-    K = auto()
-    EXPONENT = auto()
-    LEARNS = auto()  # 0 if it follows a policy
-    LAYS = auto()  # a bit for each pheromone
-    CUES = auto()  # the number of its cues in `Task.all_cues`
+def _rows(names: Iterable[str]) -> Any:
+    return IntEnum("Row", [name.upper() for name in names], start=0)
 
 
-class FoodRow(IntEnum):
-    """Rows of `food_numbers`, one column for each kind of food; see `Food`."""
-
-    PICK_UP = 0
-    DELIVER = auto()
-    LOADS = auto()
-    REGROWTH = auto()  # -1 if it does not grow back
+# Rows of `castes`, one column for each caste; numbers of other features follow.
+CasteRow = _rows(CASTES.of_castes)
+# Rows of `food_numbers`, one column for each kind of food: the settings of `Food`.
+FoodRow = _rows(field.name for field in fields(Food))
 
 
 class FoodSourceRow(IntEnum):

@@ -13,7 +13,7 @@ import numpy as np
 
 from taichi_ants import arguments, runtime
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, WorldRow
-from taichi_ants.engines.colony.state import ALL, ColonyState, Which, checked_worlds
+from taichi_ants.engines.colony.state import ALL, ColonyState, Which
 from taichi_ants.errors import AntsError, as_array, checked_whole, count, entries_of, shown
 from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
@@ -141,7 +141,7 @@ class TickingColony(ColonyState):
         Raises:
             AntsError: A world is not allowed.
         """
-        others = None if world is None else checked_worlds(world, len(self.seeds), self.learns)
+        others = None if world is None else self.checked_worlds(world)
         length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
         if others is not None:
             fresh = copy.copy(self)  # the worlds may have too little room
