@@ -10,13 +10,15 @@ from taichi_ants.engines.colony.layout import FoodSourceRow, WorldRow
 from taichi_ants.task.constants import FOOD
 from taichi_ants.worlds.world import World
 
+_GIVEN = [FoodSourceRow.CELL, FoodSourceRow.TAKEN, FoodSourceRow.PILE, FoodSourceRow.KIND]
+
 
 def arrays(
     sources: Iterable[np.ndarray], rows: np.ndarray, room: int, size: int
 ) -> dict[str, np.ndarray]:
     """Return the arrays of food sources and piles of all worlds, with `room` sources in each.
 
-    `sources` has for each world the rows CELL, TAKEN, PILE and KIND of `FoodSourceRow`, (4, n).
+    `sources` has for each world the rows `_GIVEN` of `FoodSourceRow`, (4, n).
     Write the numbers of sources and piles into `rows`, (WorldRow, W). A world has `size` cells.
     """
     n_worlds = rows.shape[1]
@@ -24,15 +26,12 @@ def arrays(
     begins = np.zeros((n_worlds, room + 1), np.int32)
     food_sources[FoodSourceRow.TAKEN] = -1
     source_of = np.full(n_worlds * size if room else 1, -1, np.int32)
-    for w, (cells, taken, piles, kinds) in enumerate(sources):
+    for w, given in enumerate(sources):
+        cells, taken, piles, _ = given
         n_piles = int(piles.max(initial=-1)) + 1
         of_world = food_sources[:, w * room : w * room + len(cells)]
-        of_world[FoodSourceRow.CELL], of_world[FoodSourceRow.TAKEN] = cells, taken
-        of_world[FoodSourceRow.KIND] = kinds
-        of_world[FoodSourceRow.PILE], of_world[FoodSourceRow.LISTED] = (
-            piles,
-            np.argsort(piles, kind="stable"),
-        )
+        of_world[_GIVEN] = given
+        of_world[FoodSourceRow.LISTED] = np.argsort(piles, kind="stable")
         begins[w, 1 : n_piles + 1] = np.cumsum(np.bincount(piles, minlength=n_piles))
         rows[WorldRow.FOOD_SOURCES, w], rows[WorldRow.PILES, w] = len(cells), n_piles
         (full,) = np.nonzero(taken < 0)
@@ -70,8 +69,7 @@ def at_start(world: World) -> np.ndarray:
 def of_world(arrays: Mapping[str, np.ndarray], w: int, room: int) -> np.ndarray:
     """Return the present food sources of a world as `arrays` takes them, int (4, n)."""
     n = arrays["worlds"][WorldRow.FOOD_SOURCES, w]
-    rows = [FoodSourceRow.CELL, FoodSourceRow.TAKEN, FoodSourceRow.PILE, FoodSourceRow.KIND]
-    return arrays["food_sources"][rows, w * room : w * room + n]
+    return arrays["food_sources"][_GIVEN, w * room : w * room + n]
 
 
 def changed(

@@ -364,7 +364,8 @@ class _World:
             offsets = colony.grid.offsets
             now = food_sources.changed(sources[self.w], cells, what, kind, offsets)
             sources[self.w] = now
-            colony.make_food_sources_fit(now.shape[1])
+            if now.shape[1] > room:
+                colony.read_start(now.shape[1])
             arrays |= food_sources.arrays(
                 sources, arrays["worlds"], colony.n_food_sources, colony.grid.size
             )

@@ -39,14 +39,10 @@ from taichi_ants.errors import (
     as_array,
     check_one_of,
     checked_whole,
-    count,
-    entries_of,
-    expect,
-    shown,
 )
 from taichi_ants.features import arrays
 from taichi_ants.features.feature import ANT, CASTE, NEST
-from taichi_ants.features.support import BASE, CASTES, COLONY, refuse_unsupported
+from taichi_ants.features.support import COLONY
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state, words_of
@@ -151,27 +147,9 @@ class ColonyState:
         self.ants, self.start, self.ends_at_delivery = int(ants), start, bool(ends_at_delivery)
         check_one_of("sharing", sharing, SHARINGS)
         self.sharing, self.learns = sharing, sharing != "frozen"
-        self.has_training = training is not None or self.learns or q_values is not None
+        given = arguments.checked_training(training, task, sharing, q_values is not None)
+        self.has_training, self.training = given is not None, given or _NO_TRAINING
         self.is_given_actions = task.choice.needs_table and not self.has_training
-        if self.has_training and not task.choice.needs_table:
-            raise AntsError(
-                f"`task.choice.rule` is {task.choice.rule!r}, so ants choose without action "
-                f"values, but sharing is {shown(sharing)} and there is a training or q_values; set "
-                'sharing to "frozen" and training to None, and leave out q_values.'
-            )
-        if self.has_training:
-            expect("training", training, TrainingConfig)
-        (self.training,) = arguments.checked_configs(training or _NO_TRAINING)
-        policies = [caste.policy for caste in task.castes.values()] or [None]
-        if self.has_training and not self.learns and q_values is None and None in policies:
-            raise AntsError(
-                "sharing is 'frozen', but q_values is None; give the action values that the ants "
-                "follow, because they do not learn."
-            )
-        if self.learns:
-            arguments.check_learner(self.training, task, sharing)
-        if self.is_given_actions:
-            refuse_unsupported("a colony with given actions", task.uses(), BASE - CASTES)
         table = None if q_values is None else checked_values(q_values, task)
         self.seeds = arguments.checked_seeds(seeds)
         running = runtime.start(threads, arch)
@@ -406,27 +384,8 @@ class ColonyState:
 
     def checked_worlds(self, world: World | Sequence[World]) -> tuple[World, ...]:
         """Return one world per seed; AntsError if their number is wrong or one does not fit."""
-        given = entries_of(world) or [world] * len(self.seeds)
-        worlds = tuple(arguments.checked_world(w, self.learns, "a colony", SUPPORTS) for w in given)
-        if len(worlds) != len(self.seeds):
-            raise AntsError(
-                f"there are {len(worlds)} worlds for {len(self.seeds)} seeds; give one world per "
-                "seed."
-            )
-        arguments.check_ranges(worlds)
-        n_nests = self.n_nests or worlds[0].n_nests
-        for one in worlds:
-            if one.n_nests != n_nests:
-                raise AntsError(
-                    f"a world has {count(one.n_nests, 'nest')}, but another one {n_nests}; all "
-                    "worlds of a colony must have the same number."
-                )
-            if one.n_food_kinds > self.n_kinds:
-                raise AntsError(
-                    f"the world has {count(one.n_food_kinds, 'kind')} of food, but the task "
-                    f"{self.n_kinds}; add the others to `task.foods`."
-                )
-        return worlds
+        known = len(self.seeds), self.learns, self.n_kinds, self.n_nests
+        return arguments.checked_worlds(world, *known)
 
     def lay_out(self, worlds: tuple[World, ...]) -> None:
         """Make the arrays that depend on the worlds; AntsError if they have too few free cells."""
@@ -438,7 +397,7 @@ class ColonyState:
 
     def make_room_for_food(self, n: int) -> None:
         """Reset all arrays of episodes, with room for n food sources in each world."""
-        self._read_start(n)
+        self.read_start(n)
         made = {name: array.copy() for name, array in self.at_start.items()}
         made |= self._pheromones(len(self.worlds) * self.grid.size)
         dense = self.model.dense_by_number[0]  # of the trail; the other array is not in use
@@ -451,11 +410,6 @@ class ColonyState:
         self._changing = tuple(made)
         self.arrays |= made
         self._set_to_start()
-
-    def make_food_sources_fit(self, n: int) -> None:
-        """Let the start of episodes have room for n food sources in each world, if it has less."""
-        if n > self.n_food_sources:
-            self._read_start(n)
 
     def reset(self, which: Which) -> None:
         """Reset the arrays of worlds, and begin the random streams of their next episode."""
@@ -486,7 +440,7 @@ class ColonyState:
         changed = dict(zip(places.tolist(), seeds, strict=True))
         self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
         self.arrays["seeds"][:] = words_of(self.seeds)
-        self._read_start(self.n_food_sources)
+        self.read_start(self.n_food_sources)
         self._copy_worlds(self._seeded(), which)
 
     def stop(self, which: np.ndarray) -> None:
@@ -545,7 +499,7 @@ class ColonyState:
 
     # Arrays
 
-    def _read_start(self, n_food_sources: int) -> None:
+    def read_start(self, n_food_sources: int) -> None:
         """Set the arrays with which worlds and ants begin each episode, see `_set_to_start`."""
         self.n_food_sources = n_food_sources
         worlds, n, model = self.worlds, self.ants, self.model
@@ -708,8 +662,12 @@ class ColonyState:
 
     def _settings(self) -> Arrays:
         """Return the settings of the task as kernels read them."""
-        task, settings = self.task, {}
-        rules = [value for rule in task.rules.values() for value in vars(rule).values()]
+        task = self.task
+        settings = {
+            "rewards": task.rewards.by_event(),
+            "choice": task.choice.numbers(),
+            "food_numbers": _food_numbers(task),
+        }
         for feature in self.model.features:
             if feature.numbers:
                 values = (getattr(feature.of(task), name) for name in feature.numbers)
@@ -717,13 +675,9 @@ class ColonyState:
         for feature in self.model.features:
             settings |= feature.constants(self)
         if task.rules:  # the parameters of your own rules
+            rules = [value for rule in task.rules.values() for value in vars(rule).values()]
             settings["rule_numbers"] = np.array([*rules, 0.0], np.float64)
-        return {
-            "rewards": task.rewards.by_event(),
-            "choice": task.choice.numbers(),
-            "food_numbers": _food_numbers(task),
-            **settings,
-        }
+        return settings
 
     def _ground_constants(self) -> Arrays:
         """Return the constants that depend on rocks and the queen."""
@@ -732,11 +686,11 @@ class ColonyState:
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
             # By cell: a bit for each heading that leads nearer to the queen.
             "closer": self._of_each(
-                lambda world: np.stack([world.closer(nest) for nest in range(world.n_nests)])
+                lambda world: [world.closer(nest) for nest in range(world.n_nests)]
             ).reshape(-1),
         }
 
-    def _of_each(self, make: Callable[[World], np.ndarray]) -> np.ndarray:
+    def _of_each(self, make: Callable[[World], Any]) -> np.ndarray:
         """Return an array for each world, made once for equal worlds."""
         made = {world: make(world) for world in dict.fromkeys(self.worlds)}
         return np.stack([made[world] for world in self.worlds])
@@ -822,11 +776,7 @@ class ColonyState:
         if not isinstance(other, ColonyState):
             return NotImplemented
         (facts, arrays), (other_facts, other_arrays) = self.contents(), other.contents()
-        return (
-            facts == other_facts
-            and arrays.keys() == other_arrays.keys()
-            and all(same(array, other_arrays[name]) for name, array in arrays.items())
-        )
+        return facts == other_facts and same(arrays, other_arrays)
 
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from taichi.lang.impl import subscript
@@ -54,79 +54,61 @@ def names_of(model: Model) -> Names:
     )
 
 
-class View:
-    """An ant or a nest of a world, while a kernel compiles.
+class Named:
+    """An object with attributes that a function returns by name, while a kernel compiles."""
+
+    _data_oriented = True  # Taichi requires it of objects whose attributes kernels read
+
+    def __init__(self, read: Callable[[str], Any]) -> None:
+        self._read = read
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # of Python
+            raise AttributeError(name)
+        return self._read(name)
+
+
+def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
+    """Return the view of an ant or a nest of a world, while a kernel compiles.
 
     An attribute is an entry of an array, which can be assigned: by the slot of the ant, or by its
     nest, world or caste. `task` has the settings that features declare as numbers, for example
     `task.labour.demand`. Other names are those of the arrays and numbers of kernels.
     """
 
-    _data_oriented = True  # Taichi requires it of objects whose attributes kernels read
+    def index(per: str) -> Any:
+        if per == WORLD:
+            return w
+        if per == ANT:
+            return ant
+        if per == CASTE:
+            return columns.trait(c.caste, ant)
+        number = columns.nest_of(c, v, ant) if nest is None else nest
+        return w * v.n_nests + number
 
-    def __init__(self, c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> None:
-        self._c, self._v, self._w, self._nest, self._ant = c, v, w, nest, ant
+    def group(name: str) -> Named:
+        numbers, array = v.names.numbers[name], getattr(c, f"{name}_numbers")
+        return Named(lambda name: subscript(None, array, numbers.index(name)))
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # of Python
-            raise AttributeError(name)
-        c, names = self._c, self._v.names
+    def read(name: str) -> Any:
         if name == "task":
-            return TaskNumbers(c, names.numbers)
-        if name not in names.entries:
+            return Named(group)
+        if name not in v.names.entries:
             return getattr(c, name)
-        array, per, row = names.entries[name]
-        index = self._index(per)
-        at = (index,) if row is None else (row, index)
+        array, per, row = v.names.entries[name]
+        at = (index(per),) if row is None else (row, index(per))
         return subscript(None, getattr(c, array), *at)
 
-    def _index(self, per: str) -> Any:
-        c, v = self._c, self._v
-        if per == WORLD:
-            return self._w
-        if per == ANT:
-            return self._ant
-        if per == CASTE:
-            return columns.trait(c.caste, self._ant)
-        nest = columns.nest_of(c, v, self._ant) if self._nest is None else self._nest
-        return self._w * v.n_nests + nest
-
-
-class TaskNumbers:
-    """The groups of settings of a task that hooks read, while a kernel compiles."""
-
-    _data_oriented = True
-
-    def __init__(self, c: Any, names: Mapping[str, tuple[str, ...]]) -> None:
-        self._c, self._names = c, names
-
-    def __getattr__(self, group: str) -> Any:
-        if group not in self._names:
-            raise AttributeError(group)
-        return Numbers(getattr(self._c, f"{group}_numbers"), self._names[group])
-
-
-class Numbers:
-    """The numbers of a group of settings, while a kernel compiles."""
-
-    _data_oriented = True
-
-    def __init__(self, array: Any, names: tuple[str, ...]) -> None:
-        self._array, self._names = array, names
-
-    def __getattr__(self, name: str) -> Any:
-        if name not in self._names:
-            raise AttributeError(name)
-        return subscript(None, self._array, self._names.index(name))
+    return Named(read)
 
 
 @for_kernels
-def ant_view(c: Any, v: Any, w: Any, ant: Any) -> View:
+def ant_view(c: Any, v: Any, w: Any, ant: Any) -> Named:
     """Return the view of an ant."""
-    return View(c, v, w, ant=ant)
+    return _view(c, v, w, ant=ant)
 
 
 @for_kernels
-def nest_view(c: Any, v: Any, w: Any, nest: Any) -> View:
+def nest_view(c: Any, v: Any, w: Any, nest: Any) -> Named:
     """Return the view of a nest."""
-    return View(c, v, w, nest=nest)
+    return _view(c, v, w, nest=nest)
