@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from numbers import Real
 
 import numpy as np
@@ -158,6 +158,24 @@ def checked_training(
     if learns:
         check_learner(training, task, sharing)
     return training
+
+
+def checked_tables(q_values: np.ndarray, n_worlds: int, axes: Mapping[str, int]) -> np.ndarray:
+    """Return tables (..., n_states, 5) of a colony with a leading axis W, and one of all `axes`.
+
+    AntsError unless there is one table, one per world, or one for each place on the axes.
+    """
+    leading, form = q_values.shape[:-2], q_values.shape[-2:]
+    owners = {(n_worlds, *axes.values()): " and ".join(axes), (n_worlds,): "world"}
+    if leading and leading not in owners:
+        listed = [
+            f"{(*shape, *form)} for one table per {owners[shape]}"
+            for shape in sorted(owners, key=len)
+        ]
+        raise AntsError(
+            f"q_values has shape {q_values.shape}; give {form}, {', or '.join(listed)}."
+        )
+    return q_values.reshape(*leading[:1], -1, *form)
 
 
 def checked_configs(

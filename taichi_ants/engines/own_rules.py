@@ -18,6 +18,20 @@ from taichi_ants.rules.inputs import KINDS, values_shown
 from taichi_ants.rules.rule import TRIES, Rule, tries
 
 
+class Named:
+    """An object with attributes that a function returns by name, while a kernel compiles."""
+
+    _data_oriented = True  # Taichi requires it of objects whose attributes kernels read
+
+    def __init__(self, read: Callable[[str], Any]) -> None:
+        self._read = read
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # of Python
+            raise AttributeError(name)
+        return self._read(name)
+
+
 @ti.func
 def modulo(x, y):
     """Return x modulo y, with the sign of y: f64 -> f64."""

@@ -297,7 +297,7 @@ class Recorder:
         rates = (colony.epsilon, colony.learning_rate)
         delivered = colony.delivered[self.world] + totals[0]
         counts = (len(numbers), delivered, self.ticks)
-        stored = [colony.stored_trail(self.world, name) for name in (TRAIL, *colony.task.fields)]
+        stored = [colony.stored_pheromone(self.world, n) for n in range(len(self._trails))]
         clocks = [clock for _, clock in stored]
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, *clocks)
         sections["progress"], self._new = self._new, []
@@ -309,7 +309,7 @@ class Recorder:
         for number, (layer, _) in enumerate(stored):
             cells, name = np.flatnonzero(self._trails[number] != layer), f"trail{number or ''}"
             sections |= {f"{name}_at": cells, name: layer[cells]}
-        self._trails = [layer for layer, _ in stored]
+        self._trails = [layer.copy() for layer, _ in stored]
         sections |= self._table_changes(slots, numbers, sections["states"])
         return pack(self.types, sections)
 

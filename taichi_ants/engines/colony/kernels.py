@@ -24,7 +24,7 @@ from taichi_ants.engines.colony.layout import (
     WorldRow,
     array_of,
 )
-from taichi_ants.engines.colony.views import names_of
+from taichi_ants.engines.colony.views import entries_of
 from taichi_ants.features import hooks_at
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.task.model import Model
@@ -55,7 +55,7 @@ class Variant:
         # The hooks of features at each point, in their order.
         self.at = hooks_at(model.features)
         self.can_rest = bool(self.at["rests"])
-        self.names = names_of(model)
+        self.entries = entries_of(model)
         own = own_inputs.own_rules(model.rules)
         self.own_choice = model.choice_rule and own[model.choice_rule].choose
         self.own_reward = model.reward_rule and own[model.reward_rule].pay

@@ -67,7 +67,6 @@ Which = slice | np.ndarray
 # Views of arrays in snapshots: those of the core, and those of features.
 _IN_SNAPSHOTS = ("cells", "headings", "numbers", "actions", "events", "nests")
 OF_ANTS = tuple(array.view for _, array in arrays(ANT))
-_BY_NEST_AND_KIND = "deliveries_by_nest_and_kind"
 ALL = slice(None)  # selects all worlds; a bool (W,) selects some
 
 _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
@@ -113,6 +112,9 @@ class ColonyState:
         ready: bool (W,), whether an episode has begun, and each change of it was completed.
         delivered: int64 (W,), food items delivered in previous episodes.
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
+        episode_ticks: int32 (W,), ticks since the episode of each world began; a view.
+        deliveries: int32 (W,), deliveries of the present episode; a view.
+        living: bool (W, capacity), whether an ant lives in each slot.
 
     Arrays by slot have views (W, capacity) by the names in `layout.COLUMNS`: `numbers`, `cells`,
     `headings`, `paper_states`, `actions`, `events` and `next_actions`, which are writable, and
@@ -207,26 +209,14 @@ class ColonyState:
         """Whether the episode of each world is still running, bool (W,)."""
         return self.arrays["worlds"][WorldRow.RUNNING] == 1
 
-    @property
-    def episode_ticks(self) -> np.ndarray:
-        """Ticks since the episode of each world began, int32 (W,); a view."""
-        return self.arrays["worlds"][WorldRow.TICKS]
-
-    @property
-    def deliveries(self) -> np.ndarray:
-        """Deliveries of the present episode, int32 (W,); a view."""
-        return self.arrays["worlds"][WorldRow.DELIVERIES]
+    episode_ticks = property(lambda colony: colony.arrays["worlds"][WorldRow.TICKS])
+    deliveries = property(lambda colony: colony.arrays["worlds"][WorldRow.DELIVERIES])
+    living = property(lambda colony: colony.stages == Stage.LIVING)
+    streams = view("streams", ANT)
 
     def part(self, name: str, world: int) -> np.ndarray:
         """Return a view of a world's part of an array that has only parts of worlds."""
         return self.arrays[name].reshape(len(self.seeds), -1)[world]
-
-    streams = view("streams", ANT)
-
-    @property
-    def living(self) -> np.ndarray:
-        """Whether an ant lives in each slot, bool (W, capacity)."""
-        return self.stages == Stage.LIVING
 
     @property
     def queen_cells(self) -> np.ndarray:
@@ -296,23 +286,25 @@ class ColonyState:
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
-        counts: Any = {name: array[None].copy() for name, array in self._counts().items()}
-        return ColonyEpisodes(**counts, seeds=self.seeds)
+        return self._outcome()
 
-    def _counts(self) -> Arrays:
-        """Return the counts of the episode (W, ...), by their names in `ColonyEpisodes`."""
-        arrays, rows, n = self.arrays, self.arrays["worlds"], len(self.seeds)
-        apart = deliveries = self.deliveries.astype(np.int32)
+    def _outcome(self) -> ColonyEpisodes:
+        arrays, n, deliveries = self.arrays, len(self.seeds), self.deliveries.astype(np.int32)
+        by_nest_and_kind = deliveries
         if self.model.counts_by_nest_and_kind:
-            apart = arrays[_BY_NEST_AND_KIND]
+            by_nest_and_kind = arrays["deliveries_by_nest_and_kind"]
         stores = arrays["nests"][NestRow.STORE].reshape(n, -1)
-        return {
+        counts: Any = {
             **{row.name.lower(): arrays["totals"][row] for row in TOTALS},
             "waiting_births": stores.sum(axis=1, dtype=np.int32),
-            **{row.name.lower(): rows[row] for row in WorldRow if row >= WorldRow.TICKS},
-            _BY_NEST_AND_KIND: apart.reshape(n, self.n_nests, self.n_kinds),
+            **{
+                row.name.lower(): arrays["worlds"][row] for row in WorldRow if row >= WorldRow.TICKS
+            },
+            "deliveries_by_nest_and_kind": by_nest_and_kind.reshape(n, self.n_nests, self.n_kinds),
             "caste_deliveries": arrays.get("caste_deliveries", deliveries).reshape(n, -1),
         }
+        copies = {name: array[None].copy() for name, array in counts.items()}
+        return ColonyEpisodes(**copies, seeds=self.seeds)
 
     def snapshot(self, world: int = 0) -> Snapshot:
         """Return the present state of world number `world`; arrays are copies."""
@@ -328,11 +320,10 @@ class ColonyState:
         for number, name in enumerate((TRAIL, *self.task.fields)):
             stored, clock = self.stored_pheromone(w, number)
             further[name] = np.maximum(stored - stored.dtype.type(clock), 0)
-        of_world = {name: array[w] for name, array in self._counts().items()}
-        of_castes, by_nest = of_world.pop("caste_deliveries"), of_world.pop(_BY_NEST_AND_KIND)
-        counts: dict[str, Any] = {name: int(n) for name, n in of_world.items()}
-        counts["nest_deliveries"] = by_nest.sum(axis=1, dtype=np.int32)
-        counts["food_deliveries"] = by_nest.sum(axis=0, dtype=np.int32)
+        outcome = self._outcome()
+        counts: dict[str, Any] = {name: int(n[0, w]) for name, n in outcome.counts().items()}
+        for name in ("nest_deliveries", "food_deliveries", "caste_deliveries"):
+            counts[name] = getattr(outcome, name)[0, w]
         return Snapshot(
             self.grid,
             ground,
@@ -345,23 +336,16 @@ class ColonyState:
             queens=self.queen_cells[w].copy(),
             of_ants={name: shown[name] for name in OF_ANTS},
             fields=further,
-            counts=counts | {"caste_deliveries": of_castes.copy()},
+            counts=counts,
             world=self.worlds[w],
         )
 
-    def stored_trail(self, world: int = 0, field: str = TRAIL) -> tuple[np.ndarray, int]:
-        """Return a copy of the trail of world number `world` as kernels store it, and the clock.
-
-        `field` is the name of another pheromone; AntsError if there is none. The stored trail has
-        expiry clocks, int32 (grid.size,). If the pheromone is dense, it has levels, float32, and
-        the clock is 0. The level of a cell is max(stored - clock, 0).
-        """
-        check_one_of("field", field, (TRAIL, *self.task.fields))
-        stored, clock = self.stored_pheromone(world, self.task.number_of(field))
-        return stored.copy(), clock
-
     def stored_pheromone(self, world: int, number: int) -> tuple[np.ndarray, int]:
-        """Return a view of a pheromone as kernels store it, by its number, and its clock."""
+        """Return a view of a pheromone as kernels store it, and its clock; 0 is the trail.
+
+        A pheromone in whole numbers has expiry clocks, int32 (grid.size,). A dense one has levels,
+        float32, and its clock is 0. The level of a cell is max(stored - clock, 0).
+        """
         pheromone = self.pheromones[number]
         falls = pheromone.evaporation == "linear" and not pheromone.dense
         stored = self.part(array_of(number, pheromone.dense), world)
@@ -538,7 +522,7 @@ class ColonyState:
             # The kind of the food in each cell, and its loads; tiny if kernels do not need them.
             "kind_of": kinds.reshape(-1) if self.n_kinds > 1 else np.zeros(1, np.uint8),
             "loads": loads.reshape(-1) if model.has_loads else np.zeros(1, np.int32),
-            _BY_NEST_AND_KIND: np.zeros(of_nests.shape[1] * self.n_kinds, np.int32),
+            "deliveries_by_nest_and_kind": np.zeros(of_nests.shape[1] * self.n_kinds, np.int32),
             **{
                 array.name: np.zeros(len(worlds) * self.sizes[array.per], array.dtype)
                 for feature in model.features
@@ -606,17 +590,8 @@ class ColonyState:
         q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
         q[..., :N_ACTIONS] = self.training.initial_q
         if q_values is not None:
-            leading, axes, form = q_values.shape[:-2], self._axes, (n_states, N_ACTIONS)
-            owners = {(n_worlds, *axes.values()): " and ".join(axes), (n_worlds,): "world"}
-            if leading and leading not in owners:
-                listed = [
-                    f"{(*shape, *form)} for one table per {owners[shape]}"
-                    for shape in sorted(owners, key=len)
-                ]
-                raise AntsError(
-                    f"q_values has shape {q_values.shape}; give {form}, {', or '.join(listed)}."
-                )
-            q[..., :N_ACTIONS] = q_values.reshape(*leading[:1], -1, 1, *form)
+            tables = arguments.checked_tables(q_values, n_worlds, self._axes)
+            q[..., :N_ACTIONS] = tables[..., None, :, :]
         for number, (name, caste) in enumerate(self.task.castes.items()):
             if caste.policy is not None:
                 path = f"`task.castes.{name}.policy`"
@@ -749,8 +724,6 @@ class ColonyState:
         runtime.start(threads, arch)  # first, because its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):
             training = facts["training"] and TrainingConfig(**facts["training"])
-            if training is not None:
-                learners.get(training.learner)
             worlds = [World.from_dict(world) for world in facts["worlds"]]
             task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
             if options["sharing"] == "frozen" and training is not None:

@@ -72,7 +72,7 @@ class Stepper:
         end = state.ticks + n
         if state.schedule == "by_world":
             n_worlds = len(state.seeds)
-            threads = threads_for(n_worlds)
+            threads = min(runtime.start().threads, n_worlds)
             self._launch_ticks(state, n, parts=threads * -(-n_worlds // threads), threads=threads)
             return
         interval = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
@@ -115,11 +115,6 @@ class Stepper:
                 orders[[Order.PARTS, Order.FIRST]] = 1, opened - GAVE_UP + 1
                 barrier[:] = 0
                 self.launch(state, "ticks")
-
-
-def threads_for(n_worlds: int) -> int:
-    """Return the number of threads among which worlds are dealt, see `Order.THREADS`."""
-    return min(runtime.start().threads, n_worlds)
 
 
 class TickingColony(ColonyState):

@@ -2,70 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from taichi.lang.impl import subscript
 
 from taichi_ants.engines.colony import columns
 from taichi_ants.engines.colony.layout import COLUMNS, NestRow, WorldRow
-from taichi_ants.engines.own_rules import for_kernels
+from taichi_ants.engines.own_rules import Named, for_kernels
 from taichi_ants.features import numbers_of_castes
-from taichi_ants.features.feature import NEST
+from taichi_ants.features.feature import ANT, CASTE, NEST
 from taichi_ants.task.model import Model
 
-ANT, WORLD, CASTE = "ant", "world", "caste"
+WORLD = "world"
 
 
-class Entry(NamedTuple):
-    """What a name means in a view: an array of kernels, the row in it if any, and its index."""
-
-    array: str
-    per: str
-    row: int | None = None
-
-
-class Names(NamedTuple):
-    """The names that views of a model know: entries of arrays, and numbers of features."""
-
-    entries: Mapping[str, Entry]
-    numbers: Mapping[str, tuple[str, ...]]
-
-
-def names_of(model: Model) -> Names:
-    """Return the names that hooks of the features of a model can read and write."""
+def entries_of(model: Model) -> dict[str, tuple[str, str, int | None]]:
+    """Return what names mean to the hooks of a model: an array, per what, and the row in it."""
     used = model.features
     of_castes = numbers_of_castes(used) if model.n_castes else {}
-    return Names(
-        {
-            **{name: Entry(name, ANT) for name in COLUMNS},
-            "stream": Entry("streams", ANT),
-            "seed": Entry("seeds", WORLD),
-            **{row.name.lower(): Entry("worlds", WORLD, row) for row in WorldRow},
-            **{row.name.lower(): Entry("nests", NEST, row) for row in NestRow},
-            **{name: Entry("castes", CASTE, row) for row, name in enumerate(of_castes)},
-            **{
-                array.name: Entry(array.name, array.per)
-                for feature in used
-                for array in feature.arrays
-            },
-        },
-        {feature.group: feature.numbers for feature in used if feature.numbers},
-    )
-
-
-class Named:
-    """An object with attributes that a function returns by name, while a kernel compiles."""
-
-    _data_oriented = True  # Taichi requires it of objects whose attributes kernels read
-
-    def __init__(self, read: Callable[[str], Any]) -> None:
-        self._read = read
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # of Python
-            raise AttributeError(name)
-        return self._read(name)
+    arrays = [array for feature in used for array in feature.arrays]
+    return {
+        **{name: (name, ANT, None) for name in COLUMNS},
+        "stream": ("streams", ANT, None),
+        "seed": ("seeds", WORLD, None),
+        **{row.name.lower(): ("worlds", WORLD, row) for row in WorldRow},
+        **{row.name.lower(): ("nests", NEST, row) for row in NestRow},
+        **{name: ("castes", CASTE, row) for row, name in enumerate(of_castes)},
+        **{array.name: (array.name, array.per, None) for array in arrays},
+    }
 
 
 def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
@@ -87,15 +51,16 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
         return w * v.n_nests + number
 
     def group(name: str) -> Named:
-        numbers, array = v.names.numbers[name], getattr(c, f"{name}_numbers")
-        return Named(lambda name: subscript(None, array, numbers.index(name)))
+        (numbers,) = [f.numbers for f in v.features if f.group == name and f.numbers]
+        array = getattr(c, f"{name}_numbers")
+        return Named(lambda setting: subscript(None, array, numbers.index(setting)))
 
     def read(name: str) -> Any:
         if name == "task":
             return Named(group)
-        if name not in v.names.entries:
+        if name not in v.entries:
             return getattr(c, name)
-        array, per, row = v.names.entries[name]
+        array, per, row = v.entries[name]
         at = (index(per),) if row is None else (row, index(per))
         return subscript(None, getattr(c, array), *at)
 
