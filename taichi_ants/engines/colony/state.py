@@ -112,9 +112,11 @@ class ColonyState:
         ready: bool (W,), whether an episode has begun, and each change of it was completed.
         delivered: int64 (W,), food items delivered in previous episodes.
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
+        running: bool (W,), whether the episode of each world is still running.
         episode_ticks: int32 (W,), ticks since the episode of each world began; a view.
         deliveries: int32 (W,), deliveries of the present episode; a view.
         living: bool (W, capacity), whether an ant lives in each slot.
+        queen_cells: int32 (W, nests), flat indices of the cells of queens; a view.
 
     Arrays by slot have views (W, capacity) by the names in `layout.COLUMNS`: `numbers`, `cells`,
     `headings`, `paper_states`, `actions`, `events` and `next_actions`, which are writable, and
@@ -204,24 +206,20 @@ class ColonyState:
     def ticks(self, ticks: int) -> None:
         self.arrays["orders"][Order.PASSED] = ticks
 
-    @property
-    def running(self) -> np.ndarray:
-        """Whether the episode of each world is still running, bool (W,)."""
-        return self.arrays["worlds"][WorldRow.RUNNING] == 1
-
+    running = property(lambda colony: colony.arrays["worlds"][WorldRow.RUNNING] == 1)
     episode_ticks = property(lambda colony: colony.arrays["worlds"][WorldRow.TICKS])
     deliveries = property(lambda colony: colony.arrays["worlds"][WorldRow.DELIVERIES])
     living = property(lambda colony: colony.stages == Stage.LIVING)
+    queen_cells = property(lambda colony: colony.of_nests(NestRow.QUEEN_CELL))
     streams = view("streams", ANT)
 
     def part(self, name: str, world: int) -> np.ndarray:
         """Return a view of a world's part of an array that has only parts of worlds."""
         return self.arrays[name].reshape(len(self.seeds), -1)[world]
 
-    @property
-    def queen_cells(self) -> np.ndarray:
-        """The flat index of the cell of each queen, int32 (W, nests); a view."""
-        return self.arrays["nests"][NestRow.QUEEN_CELL].reshape(len(self.seeds), -1)
+    def of_nests(self, row: int) -> np.ndarray:
+        """Return a view (W, nests) of a row of the numbers of nests."""
+        return self.arrays["nests"][row].reshape(len(self.seeds), -1)
 
     @property
     def occupied(self) -> np.ndarray:
@@ -286,25 +284,22 @@ class ColonyState:
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
-        return self._outcome()
+        counts: Any = {name: array[None].copy() for name, array in self._counts().items()}
+        return ColonyEpisodes(**counts, seeds=self.seeds)
 
-    def _outcome(self) -> ColonyEpisodes:
-        arrays, n, deliveries = self.arrays, len(self.seeds), self.deliveries.astype(np.int32)
-        by_nest_and_kind = deliveries
+    def _counts(self) -> Arrays:
+        """Return the counts of the episode (W, ...), by their names in `ColonyEpisodes`."""
+        arrays, rows, n = self.arrays, self.arrays["worlds"], len(self.seeds)
+        apart = deliveries = self.deliveries.astype(np.int32)
         if self.model.counts_by_nest_and_kind:
-            by_nest_and_kind = arrays["deliveries_by_nest_and_kind"]
-        stores = arrays["nests"][NestRow.STORE].reshape(n, -1)
-        counts: Any = {
+            apart = arrays["deliveries_by_nest_and_kind"]
+        return {
             **{row.name.lower(): arrays["totals"][row] for row in TOTALS},
-            "waiting_births": stores.sum(axis=1, dtype=np.int32),
-            **{
-                row.name.lower(): arrays["worlds"][row] for row in WorldRow if row >= WorldRow.TICKS
-            },
-            "deliveries_by_nest_and_kind": by_nest_and_kind.reshape(n, self.n_nests, self.n_kinds),
+            "waiting_births": self.of_nests(NestRow.STORE).sum(axis=1, dtype=np.int32),
+            **{row.name.lower(): rows[row] for row in WorldRow if row >= WorldRow.TICKS},
+            "deliveries_by_nest_and_kind": apart.reshape(n, self.n_nests, self.n_kinds),
             "caste_deliveries": arrays.get("caste_deliveries", deliveries).reshape(n, -1),
         }
-        copies = {name: array[None].copy() for name, array in counts.items()}
-        return ColonyEpisodes(**copies, seeds=self.seeds)
 
     def snapshot(self, world: int = 0) -> Snapshot:
         """Return the present state of world number `world`; arrays are copies."""
@@ -320,10 +315,12 @@ class ColonyState:
         for number, name in enumerate((TRAIL, *self.task.fields)):
             stored, clock = self.stored_pheromone(w, number)
             further[name] = np.maximum(stored - stored.dtype.type(clock), 0)
-        outcome = self._outcome()
-        counts: dict[str, Any] = {name: int(n[0, w]) for name, n in outcome.counts().items()}
-        for name in ("nest_deliveries", "food_deliveries", "caste_deliveries"):
-            counts[name] = getattr(outcome, name)[0, w]
+        of_world = {name: array[w] for name, array in self._counts().items()}
+        counts: dict[str, Any] = {name: int(n) for name, n in of_world.items() if not n.ndim}
+        apart = of_world["deliveries_by_nest_and_kind"]
+        counts["nest_deliveries"] = apart.sum(axis=1, dtype=np.int32)
+        counts["food_deliveries"] = apart.sum(axis=0, dtype=np.int32)
+        counts["caste_deliveries"] = of_world["caste_deliveries"].copy()
         return Snapshot(
             self.grid,
             ground,
