@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from taichi_ants.features.castes import CASTES
 from taichi_ants.features.castes import numbers_of_castes as numbers_of_castes
 from taichi_ants.features.feature import Array, Feature, KernelFunction, Task
+from taichi_ants.features.foods import FOODS
 from taichi_ants.features.labour import LABOUR
 from taichi_ants.features.life import AGE
 from taichi_ants.features.noise import MISREAD, SLIP
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 # In the order of their hooks, which is the order of random draws.
-FEATURES: tuple[Feature, ...] = (CASTES, LABOUR, SLIP, MISREAD, AGE)
+FEATURES: tuple[Feature, ...] = (FOODS, CASTES, LABOUR, SLIP, MISREAD, AGE)
 INPUTS = {name: read for feature in FEATURES for name, read in feature.inputs.items()}
 
 

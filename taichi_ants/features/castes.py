@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 TRAIL = "trail"
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
-MAX_CASTES, MAX_NESTS = 16, 7
+MAX_CASTES = 16
+MAX_NESTS = 7  # the number of a nest is in three bits of an ant's mark, of which 0 is no ant
 Rate = Annotated[float | None, Setting(least=0, most=1)]
 Number = Annotated[int | None, Setting(least=0)]
 Temperature = Annotated[float | None, Setting(least=1e-6, most=1e6)]

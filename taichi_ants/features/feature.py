@@ -30,26 +30,31 @@ State = Any  # a `ColonyState`
 
 
 class Array(NamedTuple):
-    """An array of a colony by ant, or by world and nest or caste, 0 at the start of an episode.
+    """An array of a colony by ant, or by world and nest or caste.
 
     Attributes:
         name: Its name in hooks; that of the array in kernels, and in files.
         per: ANT, NEST or CASTE.
         dtype: The type in kernels; "i1", "i4" or "f4" per ant.
-        view: Its name as an attribute of a colony, and of a snapshot with "ant_" in front.
-        shown_as: The type there.
+        view: Its name as an attribute of a colony; of a feature, also that of a snapshot, with
+            "ant_" in front. "" if it has none.
+        shown_as: The type of the attribute, which is a copy; "" for a writable view.
         words, values, unit: The name, the values and the unit in the description of a model, which
             leaves out arrays without a name.
+        start: The value at the start of an episode, and where no ant is.
+        instead: The array that the attribute shows if a colony does not need this one; "" for 0.
     """
 
     name: str
     per: str
     dtype: str
-    view: str
-    shown_as: str
+    view: str = ""
+    shown_as: str = ""
     words: str = ""
     values: str = "at least 0"
     unit: str = ""
+    start: int = 0
+    instead: str = ""
 
 
 class Mark(NamedTuple):

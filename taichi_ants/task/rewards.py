@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from taichi_ants.features.foods import Reward
 from taichi_ants.settings import Setting, Settings
-from taichi_ants.task.constants import MOST_REWARD
 from taichi_ants.task.events import Event
 
 if TYPE_CHECKING:
     import numpy as np
-
-Reward = Annotated[int, Setting(least=-MOST_REWARD, most=MOST_REWARD)]
 
 
 @dataclass(frozen=True)

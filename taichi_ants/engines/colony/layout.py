@@ -2,86 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import fields
 from enum import IntEnum, auto
-from functools import partial
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from taichi_ants.features import arrays
 from taichi_ants.features.castes import CASTES
-from taichi_ants.features.feature import ANT, Feature
+from taichi_ants.features.feature import ANT, Array
+from taichi_ants.features.foods import Food
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
-from taichi_ants.task.food import Food
 from taichi_ants.task.model import Model
 
-
-class Column(NamedTuple):
-    """An array with an entry for each slot.
-
-    Attributes:
-        dtype: The type in kernels.
-        view: Its name as an attribute (W, capacity) of a colony; "" if it has none.
-        shown_as: The type of the attribute, which is a copy; "" for a writable view.
-        start: The value at the start of an episode, and where no ant is.
-        is_used: Whether a model needs it.
-        instead: The column that the attribute shows if this one is not used; "" for 0.
-    """
-
-    dtype: type
-    view: str = ""
-    shown_as: str = ""
-    start: int = 0
-    is_used: Callable[[Model], bool] = lambda model: True
-    instead: str = ""
-
-
-def _uses(feature: Feature, model: Model) -> bool:
-    return feature in model.features
-
-
 # Small values that each tick uses take one byte, which is a quarter of the memory traffic.
-COLUMNS = {
-    "cell": Column(np.int32, "cells"),
+_CORE = (
+    Array("cell", ANT, "i4", "cells"),
     # Ticks since the pick-up of its food, or, if a field needs it, without food.
-    "carried": Column(np.int32, "carried"),
+    Array("carried", ANT, "i4", "carried"),
     # The number of its last ant; -1 in a slot that was never used in this episode.
-    "number": Column(np.int32, "numbers", start=-1),
+    Array("number", ANT, "i4", "numbers", start=-1),
     # The cell to enter or to take food from, else its own; later its previous cell.
-    "want": Column(np.int32),
+    Array("want", ANT, "i4"),
     # The state index, unless it is the paper's state.
-    "state": Column(
-        *(np.int32, "states", "i4"),
-        is_used=lambda model: not model.sees_paper_state,
-        instead="paper_state",
-    ),
+    Array("state", ANT, "i4", "states", "i4", instead="paper_state"),
     # The reward of the last action, if rewards are by your own rule.
-    "reward": Column(np.int32, is_used=lambda model: model.has_own_reward),
-    "heading": Column(np.int8, "headings"),
-    "carries": Column(np.int8, "carrying", "bool"),
-    "stage": Column(np.int8, "stages"),  # a `Stage`
-    "paper_state": Column(np.int8, "paper_states"),  # which decides about actions and rewards
-    "event": Column(np.int8, "events"),  # the result of the last action, an `Event`
+    Array("reward", ANT, "i4"),
+    Array("heading", ANT, "i1", "headings"),
+    Array("carries", ANT, "i1", "carrying", "bool"),
+    Array("stage", ANT, "i1", "stages"),  # a `Stage`
+    Array("paper_state", ANT, "i1", "paper_states"),  # which decides about actions and rewards
+    Array("event", ANT, "i1", "events"),  # the result of the last action, an `Event`
     # The last action, -1 before the first one; or the next one, if actions are given.
-    "action": Column(np.int8, "actions", start=-1),
+    Array("action", ANT, "i1", "actions", start=-1),
     # The last action as executed, if actions slip; else it is `action`.
-    "executed": Column(np.int8, "executed", "i1", -1, lambda model: model.slips, "action"),
+    Array("executed", ANT, "i1", "executed", "i1", start=-1, instead="action"),
     # The next action if it is drawn already, else -1.
-    "next_action": Column(
-        np.int8, "next_actions", start=-1, is_used=lambda model: model.draws_next_action
-    ),
-    "nest": Column(np.int8, "nests", "i4", is_used=lambda model: model.n_nests > 1),
+    Array("next_action", ANT, "i1", "next_actions", start=-1),
+    Array("nest", ANT, "i1", "nests", "i4"),
     # The kind of the last food that it picked up.
-    "kind": Column(np.int8, "kinds", "i4", is_used=lambda model: model.n_kinds > 1),
-    **{
-        array.name: Column(
-            np.dtype(array.dtype).type, array.view, array.shown_as, 0, partial(_uses, feature)
-        )
-        for feature, array in arrays(ANT)
-    },
-}
+    Array("kind", ANT, "i1", "kinds", "i4"),
+)
+# The arrays with an entry for each slot by name; of features, too.
+COLUMNS = {array.name: array for array in (*_CORE, *(array for _, array in arrays(ANT)))}
+
+
+def columns_of(model: Model) -> list[Array]:
+    """Return the columns that a model needs."""
+    needs = {
+        "state": not model.sees_paper_state,
+        "reward": model.has_own_reward,
+        "executed": model.slips,
+        "next_action": model.draws_next_action,
+        "nest": model.n_nests > 1,
+        "kind": model.n_kinds > 1,
+        **{array.name: feature in model.features for feature, array in arrays(ANT)},
+    }
+    return [array for name, array in COLUMNS.items() if needs.get(name, True)]
 
 
 class Stage(IntEnum):

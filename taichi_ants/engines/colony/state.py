@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import astuple
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
@@ -31,17 +30,14 @@ from taichi_ants.engines.colony.layout import (
     WorldRow,
     array_of,
     chunks_of,
+    columns_of,
     usual_schedule,
 )
 from taichi_ants.engines.layout import compass_of, note_best_actions
-from taichi_ants.errors import (
-    AntsError,
-    as_array,
-    check_one_of,
-    checked_whole,
-)
+from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole
 from taichi_ants.features import arrays
-from taichi_ants.features.feature import ANT, CASTE, NEST
+from taichi_ants.features.feature import ANT, CASTE, NEST, Array
+from taichi_ants.features.foods import food_numbers
 from taichi_ants.features.support import COLONY
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
@@ -54,7 +50,6 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
-from taichi_ants.task.food import Food
 from taichi_ants.task.model import Model
 from taichi_ants.worlds.world import Start, World
 
@@ -79,17 +74,14 @@ _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing",
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 
 
-def view(name: str, per: str, shown_as: str = "", instead: str = "") -> property:
-    """Return a property: a view (W, n) of an array with n entries for each world.
-
-    With a type it is a copy, of `instead` or zeros if the colony does not need the array.
-    """
+def _view_of(array: Array) -> property:
+    """Return a property of a colony: a view (W, n) of an array with n entries for each world."""
 
     def read(state: ColonyState) -> np.ndarray:
-        shape = len(state.seeds), state.sizes[per]
-        array = state.arrays.get(name, state.arrays.get(instead))
-        array = np.zeros(shape) if array is None else array.reshape(shape)
-        return array.astype(shown_as) if shown_as else array
+        shape = len(state.seeds), state.sizes[array.per]
+        entries = state.arrays.get(array.name, state.arrays.get(array.instead))
+        entries = np.zeros(shape) if entries is None else entries.reshape(shape)
+        return entries.astype(array.shown_as) if array.shown_as else entries
 
     return property(read)
 
@@ -211,7 +203,7 @@ class ColonyState:
     deliveries = property(lambda colony: colony.arrays["worlds"][WorldRow.DELIVERIES])
     living = property(lambda colony: colony.stages == Stage.LIVING)
     queen_cells = property(lambda colony: colony.of_nests(NestRow.QUEEN_CELL))
-    streams = view("streams", ANT)
+    streams = _view_of(Array("streams", ANT, "u8"))
 
     def part(self, name: str, world: int) -> np.ndarray:
         """Return a view of a world's part of an array that has only parts of worlds."""
@@ -239,11 +231,8 @@ class ColonyState:
         With a table for each slot (W, slots, n_states, 5). If several nests or castes share tables,
         they have axes after W: (W, nests, castes, n_states, 5).
         """
-        tables = self.arrays["q"].reshape(
-            len(self.seeds), self.owners, -1, self.task.n_states, ROW
-        )[:, :, 0, :, :N_ACTIONS]
-        shape = len(self.seeds), *self._axes.values(), self.task.n_states, N_ACTIONS
-        return tables.reshape(shape).copy()
+        shape = len(self.seeds), *self._axes.values(), -1, self.task.n_states, ROW
+        return self.arrays["q"].reshape(shape)[..., 0, :, :N_ACTIONS].copy()
 
     @property
     def _axes(self) -> dict[str, int]:
@@ -275,11 +264,9 @@ class ColonyState:
         if "reward" in self.arrays:
             return self.arrays["reward"].reshape(self.events.shape).copy()
         rewards = self.task.rewards.by_event()[self.events]
-        if self.task.foods:
-            picked_up, delivered = self.arrays["food_numbers"][:2, self.kinds]
-            rewards = np.where(self.events == Event.PICKED_UP, picked_up, rewards)
-            rewards = np.where(self.events == Event.DELIVERED, delivered, rewards)
-        return rewards
+        picked_up, delivered = self.arrays["food_numbers"][:2, self.kinds]
+        rewards = np.where(self.events == Event.PICKED_UP, picked_up, rewards)
+        return np.where(self.events == Event.DELIVERED, delivered, rewards)
 
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
@@ -383,25 +370,14 @@ class ColonyState:
         made |= self._pheromones(len(self.worlds) * self.grid.size)
         dense = self.model.dense_by_number[0]  # of the trail; the other array is not in use
         made[array_of(0, not dense)] = np.zeros(1, np.int32 if dense else np.float32)
-        for dtype in (np.int32, np.int8, np.float32):
-            used = [x for x, c in COLUMNS.items() if c.dtype is dtype and c.is_used(self.model)]
+        for dtype in ("i4", "i1", "f4"):
+            used = [array.name for array in columns_of(self.model) if array.dtype == dtype]
             # One allocation, because columns at equal offsets in pages slow each other down.
             columns = np.zeros((len(used), len(self.worlds) * self.capacity), dtype)
             made |= zip(used, columns, strict=True)
         self._changing = tuple(made)
         self.arrays |= made
-        self._set_to_start()
-
-    def reset(self, which: Which) -> None:
-        """Reset the arrays of worlds, and begin the random streams of their next episode."""
-        self._set_to_start(which)
-        stale = np.zeros_like(self.changed)
-        stale[which] = self.changed[which]
-        if stale.any():
-            self._copy_worlds(self._ground_constants(), stale)
-            self.changed[stale] = False
-        self._copy_worlds({"streams": self.arrays["first_streams"]}, which)
-        self.arrays["episodes"][which] += 1
+        self.set_to_start()
 
     def count_deliveries(self, which: Which = ALL) -> None:
         """Add the deliveries of the episode to those of the previous ones."""
@@ -414,15 +390,6 @@ class ColonyState:
         """Set a task for which the colony has the right arrays and kernels."""
         self.task, self.pheromones = task, task.pheromones_while(self.learns)
         self.arrays |= self._settings()
-
-    def reseed(self, which: np.ndarray, seeds: Sequence[int]) -> None:
-        """Set new seeds for some worlds, bool (W,), as if they had had no episodes."""
-        (places,) = np.nonzero(which)
-        changed = dict(zip(places.tolist(), seeds, strict=True))
-        self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
-        self.arrays["seeds"][:] = words_of(self.seeds)
-        self.read_start(self.n_food_sources)
-        self._copy_worlds(self._seeded(), which)
 
     def stop(self, which: np.ndarray) -> None:
         """End the episode of some worlds, bool (W,), which then wait for their next episode."""
@@ -481,7 +448,7 @@ class ColonyState:
     # Arrays
 
     def read_start(self, n_food_sources: int) -> None:
-        """Set the arrays with which worlds and ants begin each episode, see `_set_to_start`."""
+        """Set the arrays with which worlds and ants begin each episode, see `set_to_start`."""
         self.n_food_sources = n_food_sources
         worlds, n, model = self.worlds, self.ants, self.model
         starts = list(map(lambda w, seed: w.start(seed, n, self.start), worlds, self.seeds))
@@ -495,7 +462,7 @@ class ColonyState:
         for feature in model.features:
             self.first |= feature.columns(self)
         ground, kinds = self._of_each(World.ground), self._of_each(World.kinds_by_cell)
-        loads = np.where(ground == FOOD, _food_numbers(self.task)[FoodRow.LOADS, kinds], 0)
+        loads = np.where(ground == FOOD, food_numbers(self.task)[FoodRow.LOADS, kinds], 0)
         marks = (ANT_GROUND - (nests << 4)).astype(np.uint8)
         np.put_along_axis(ground, cells.astype(np.int64), marks, axis=1)
         levels = self._of_each(World.trail_levels)
@@ -538,9 +505,9 @@ class ColonyState:
             for number, dense in enumerate(self.model.dense_by_number)
         }
 
-    def _set_to_start(self, which: Which = ALL) -> None:
+    def set_to_start(self, which: Which = ALL) -> None:
         """Reset the arrays that change in an episode, for these worlds."""
-        self._copy_worlds(self.at_start, which)
+        self.copy_worlds(self.at_start, which)
         shape, n = (len(self.worlds), self.capacity), self.first["cell"].shape[1]
         starts: Arrays = {**self.first, "number": np.arange(n), "stage": np.array(Stage.LIVING)}
         for name in COLUMNS.keys() & self.arrays.keys():
@@ -562,14 +529,14 @@ class ColonyState:
             )
         return {
             "streams": np.zeros(n_worlds * slots, np.uint64),
-            **self._seeded(),
+            **self.seeded(),
             # By world or slot: the table, then further tables of the learner; its memory.
             "q": self._tables(q_values),
             "floats": np.zeros(max(1, owners * memory.floats), np.float32),
             "integers": np.zeros(max(1, owners * memory.integers), np.int32),
         }
 
-    def _seeded(self) -> Arrays:
+    def seeded(self) -> Arrays:
         """Return the arrays that depend on seeds and last through all episodes."""
         seeds = words_of(self.seeds)
         numbers = np.arange(self.capacity, dtype=np.uint64)  # more ants may start later episodes
@@ -605,7 +572,7 @@ class ColonyState:
         pairs = self.task.n_states * ROW * tables
         sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
         return {
-            **self._ground_constants(),
+            **self.ground_constants(),
             "compass": compass_of(self.grid),  # see `rules.actions`
             "seeds": words_of(self.seeds),
             **self._settings(),
@@ -638,7 +605,7 @@ class ColonyState:
         settings = {
             "rewards": task.rewards.by_event(),
             "choice": task.choice.numbers(),
-            "food_numbers": _food_numbers(task),
+            "food_numbers": food_numbers(task),
         }
         for feature in self.model.features:
             if feature.numbers:
@@ -651,7 +618,7 @@ class ColonyState:
             settings["rule_numbers"] = np.array([*rules, 0.0], np.float64)
         return settings
 
-    def _ground_constants(self) -> Arrays:
+    def ground_constants(self) -> Arrays:
         """Return the constants that depend on rocks and the queen."""
         return {
             # 1 for rocks and outside.
@@ -667,7 +634,7 @@ class ColonyState:
         made = {world: make(world) for world in dict.fromkeys(self.worlds)}
         return np.stack([made[world] for world in self.worlds])
 
-    def _copy_worlds(self, source: Arrays, which: Which) -> None:
+    def copy_worlds(self, source: Arrays, which: Which) -> None:
         """Copy some worlds from other arrays; worlds are consecutive in the last axis."""
         n_worlds = len(self.seeds)
         for name, array in source.items():
@@ -751,16 +718,6 @@ class ColonyState:
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
 
 
-for name, column in COLUMNS.items():
-    if column.view:
-        of_ants = view(name, ANT, column.shown_as, column.instead)
-        setattr(ColonyState, column.view, of_ants)
-for _, array in arrays(NEST):
-    setattr(ColonyState, array.view, view(array.name, NEST, array.shown_as))
-
-
-def _food_numbers(task: Task) -> np.ndarray:
-    """Return the settings of the kinds of food, int32 (FoodRow, kinds); None is -1."""
-    kinds = [astuple(food) for food in task.foods.values()] or [astuple(Food())]
-    numbers = [[-1 if number is None else number for number in kind] for kind in kinds]
-    return np.array(numbers, np.int32).T.copy()
+for array in (*COLUMNS.values(), *(array for _, array in arrays(NEST))):
+    if array.view:
+        setattr(ColonyState, array.view, _view_of(array))

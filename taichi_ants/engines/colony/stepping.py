@@ -15,6 +15,7 @@ from taichi_ants import arguments, runtime
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, WorldRow
 from taichi_ants.engines.colony.state import ALL, ColonyState, Which
 from taichi_ants.errors import AntsError, as_array, checked_whole, count, entries_of, shown
+from taichi_ants.grid.randomness import words_of
 from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
@@ -70,14 +71,14 @@ class Stepper:
     def advance(self, state: ColonyState, n: int) -> None:
         """Advance the colony by n ticks."""
         end = state.ticks + n
+        n_worlds, running = len(state.seeds), runtime.start().threads
         if state.schedule == "by_world":
-            n_worlds = len(state.seeds)
-            threads = min(runtime.start().threads, n_worlds)
+            threads = min(running, n_worlds)
             self._launch_ticks(state, n, parts=threads * -(-n_worlds // threads), threads=threads)
             return
-        interval = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
+        interval = _STEPS_BETWEEN_SORTS // (n_worlds * state.capacity)
         interval = max(_FEWEST_TICKS, min(_MOST_TICKS, interval))
-        most = min(runtime.start().threads, runtime.available_threads(), state.chunks)
+        most = min(running, runtime.available_threads(), state.chunks)
         while state.ticks < end:
             if state.ticks % interval == 0:
                 state.sort_ants()
@@ -136,17 +137,15 @@ class TickingColony(ColonyState):
         Raises:
             AntsError: A world is not allowed.
         """
-        others = None if world is None else self.checked_worlds(world)
-        length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
-        if others is not None:
-            fresh = copy.copy(self)  # the worlds may have too little room
+        fresh = copy.copy(self)
+        fresh.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
+        if world is not None:  # which may have too little room
             fresh.arrays = {**self.arrays}
-            fresh.lay_out(others)
+            fresh.lay_out(self.checked_worlds(world))
         self.ready[:] = False  # also after Ctrl-C before the end
-        if others is not None:
-            self.count_deliveries()
-            vars(self).update(vars(fresh))
-        self.length, self.ticks = length, 0
+        self.count_deliveries()
+        vars(self).update(vars(fresh))
+        self.ticks = 0
         self._start()
 
     def _start(self, which: Which = ALL) -> None:
@@ -157,7 +156,14 @@ class TickingColony(ColonyState):
         self.ready[which] = False
         self.count_deliveries(which)
         self.set_learning_rate(self.learning_rate)
-        self.reset(which)
+        self.set_to_start(which)
+        stale = np.zeros_like(self.changed)
+        stale[which] = self.changed[which]
+        if stale.any():
+            self.copy_worlds(self.ground_constants(), stale)
+            self.changed[stale] = False
+        self.copy_worlds({"streams": self.arrays["first_streams"]}, which)
+        self.arrays["episodes"][which] += 1
         self._stepper.launch(self, "begin")
         self.ready[which] = True
 
@@ -176,22 +182,24 @@ class TickingColony(ColonyState):
         if seeds is None:
             self.keep_streams(which)
         else:
-            listed, n = entries_of(seeds) or [], int(np.count_nonzero(which))
+            listed, (places,) = entries_of(seeds) or [], np.nonzero(which)
             checked = [seed for one in listed for seed in arguments.checked_seeds(one)]
-            if len(checked) != n:
-                raise AntsError(f"seeds is {shown(seeds)}; give a list of {count(n, 'seed')}.")
+            if len(checked) != len(places):
+                wanted = count(len(places), "seed")
+                raise AntsError(f"seeds is {shown(seeds)}; give a list of {wanted}.")
             self.ready[which] = False
-            self.reseed(which, checked)
+            changed = dict(zip(places.tolist(), checked, strict=True))
+            self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
+            self.arrays["seeds"][:] = words_of(self.seeds)
+            self.read_start(self.n_food_sources)
+            self.copy_worlds(self.seeded(), which)
         self._start(which)
 
-    def observe(self, worlds: Sequence[int] | None = None) -> None:
-        """Let the ants of some or all worlds observe again, after interventions in these worlds."""
-        if self.episode < 0:
-            self.check_begun()
+    def observe(self, worlds: Sequence[int]) -> None:
+        """Let the ants of some worlds observe again, after interventions in these worlds."""
         row = self.arrays["worlds"][WorldRow.RUNNING]
         running = row.copy()
-        if worlds is not None:
-            row[np.setdiff1d(np.arange(len(row)), worlds)] = 0  # ants that misread draw numbers
+        row[np.setdiff1d(np.arange(len(row)), worlds)] = 0  # ants that misread draw numbers
         try:
             self._stepper.launch(self, "see_interventions")
         finally:
