@@ -24,13 +24,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.grid.constants import N_HEADINGS, STREAM_TOUR
     from taichi_ants.grid.randomness import stream_state
     from taichi_ants.settings import Count, Seed, Setting, checked_arguments
-    from taichi_ants.studies.command_line import (
-        Parser,
-        add_threads,
-        progress_bar,
-        run_command,
-        whole_number,
-    )
+    from taichi_ants.studies import command_line
+    from taichi_ants.studies.command_line import whole_number
     from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
 
 Method = Literal["ant_system", "max_min"]
@@ -266,7 +261,7 @@ def limits(
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
-    parser = Parser(__doc__)
+    parser = command_line.Parser(__doc__)
     add = parser.add_argument
     maps = ("paper", "double_bridge")
     add("--worlds", nargs="+", default=maps, metavar="WORLD", help="worlds or map files")
@@ -278,7 +273,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     evaporation = "share that evaporates per iteration (default: 0.5; for MAX-MIN, 0.02)"
     add("--evaporation", type=float, metavar="RHO", help=evaporation)
     add("--seed", type=whole_number(), default=0, metavar="N", help="seed of all colonies")
-    add_threads(parser)
+    command_line.add_threads(parser)
     return parser.parse_args(arguments)
 
 
@@ -286,7 +281,7 @@ def print_table(settings: argparse.Namespace) -> None:
     """Print a row for each world and method, after checking all of them."""
     maps = {name: worlds.build(name, settings.seed) for name in settings.worlds}
     rows: list[str] = []
-    with progress_bar("Ant colony optimisation") as progress:
+    with command_line.progress_bar("Ant colony optimisation") as progress:
         for (name, world), method in product(maps.items(), METHODS):
             rows.append(f"{name:20} {method:11} {row(settings, world, method)}")
             progress(len(rows) / (len(maps) * len(METHODS)))
@@ -307,4 +302,4 @@ def row(settings: argparse.Namespace, world: World, method: Method) -> str:
 
 
 if __name__ == "__main__":
-    run_command(lambda: print_table(parse_arguments()))
+    command_line.run_command(lambda: print_table(parse_arguments()))

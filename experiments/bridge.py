@@ -56,10 +56,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         f"use {QUICK['seeds']} seeds, too few for intervals, and fewer episodes and ticks: to see "
         "that the study runs, not for conclusions"
     )
-    add("--quick", action="store_true", help=quick)
-    command_line.add_common(parser)
-    command_line.add_machines(parser)
-    command_line.add_results(parser, "bridge")
+    command_line.add_study(parser, "bridge", quick)
     settings, given = parser.parse_given(arguments)
     for name in QUICK.keys() - given.keys() if settings.quick else ():
         setattr(settings, name, QUICK[name])

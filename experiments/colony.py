@@ -29,19 +29,10 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import numpy as np
     from colony_figures import draw_all
     from colony_findings import JOINT, WORLD_KINDS, WORLDS, Condition, Results
+    from colony_limits import limits_of
 
-    from taichi_ants import (
-        AntsError,
-        Colony,
-        TrainingConfig,
-        World,
-        commands,
-        files,
-        learners,
-        worlds,
-    )
+    from taichi_ants import AntsError, Colony, TrainingConfig, commands, files, learners, worlds
     from taichi_ants.analysis import style
-    from taichi_ants.analysis.bounds.limits import limits_of
     from taichi_ants.analysis.drawings import drawings
     from taichi_ants.analysis.tables import plain_text, sentence
     from taichi_ants.errors import count
@@ -58,6 +49,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.study import Study
     from taichi_ants.task import Life, Pheromone, Task, foraging, paper, queueing
     from taichi_ants.viewer import record_colony
+    from taichi_ants.worlds import World
 
 VERSION = 1  # of the arrays that are kept of each run
 LEARNING = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0)  # without the decays that `scheduled` adds
@@ -128,12 +120,9 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
         f"use {QUICK['seeds']} seeds, too few for verdicts, fewer sizes, episodes and ticks, and "
         "only the kinds paper, open and piles: to see that the study runs, not for conclusions"
     )
-    add("--quick", action="store_true", help=quick)
     parser.open_settings, parser.own_settings = ("training",), _PLANNED
     command_line.add_settings(parser, LEARNING)
-    command_line.add_common(parser)
-    command_line.add_machines(parser)
-    command_line.add_results(parser, "colony")
+    command_line.add_study(parser, "colony", quick)
     settings, given = main.parse_given([*arguments])
     for name in QUICK.keys() - given.keys() if settings.quick else ():
         setattr(settings, name, QUICK[name])
@@ -318,9 +307,8 @@ def tables(plan: Plan, runs: Runs) -> str:
     policies = {}
     for condition, point in conditions.items():
         if condition.rules in COMPARED and condition.regime == JOINT:
-            q_values = runs.read([runs.study.keys[place_of[point]]], arrays=["q_values"])[
-                "q_values"
-            ][0]
+            keys = [runs.study.keys[place_of[point]]]
+            q_values = runs.read(keys, arrays=["q_values"])["q_values"][0]
             order = np.argsort(values[condition]["deliveries"], kind="stable")
             run = int(order[(len(seeds) - 1) // 2])
             policies[condition] = q_values[run]

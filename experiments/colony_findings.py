@@ -200,16 +200,11 @@ def rows_of_seeds(measured: Measured, seeds: Sequence[int]) -> list[dict[str, An
     ]
 
 
-def _stacked(measured: Measured) -> dict[str, np.ndarray]:
-    return {name: np.stack([one[name] for one in measured.values()]) for name in OF_STUDY}
-
-
 def condition_rows(measured: Measured) -> list[ConditionRow]:
     """Return a row with 95 % intervals for each condition."""
     rows = []
-    for (condition, one), estimates in zip(
-        measured.items(), centres_of(_stacked(measured)), strict=True
-    ):
+    stacked = {name: np.stack([one[name] for one in measured.values()]) for name in OF_STUDY}
+    for (condition, one), estimates in zip(measured.items(), centres_of(stacked), strict=True):
         ranges = {n: (float(one[n].min()), float(one[n].max())) for n in ("deliveries", "bound")}
         rows.append(ConditionRow(condition, len(one["deliveries"]), estimates, ranges))
     return rows
@@ -338,7 +333,10 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
         for world_kind in world_kinds:
             n = max((ants for ants, _ in judged.get((world_kind, series), {})), default=1)
             if n > 1:
-                first, second = _compared(by_condition, world_kind, series, (n, n))
+                first, second = (
+                    by_condition[Condition(world_kind, *design, n)].estimates[series.measure].mean
+                    for design in (series.first, series.second)
+                )
                 verdict = judged[world_kind, series][n, n].verdict.value
                 line.append(f"{verdict}\n{n}: {figure(first)} against {figure(second)}")
         if len(line) == len(world_kinds) > 0:
@@ -349,16 +347,6 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
         f"{COLONY['deliveries'].label}. {_basis(rows)}."
     )
     return Table("", headers, cells, [note] if cells else [], text_columns=len(headers))
-
-
-def _compared(
-    by_condition: Mapping[Condition, ConditionRow], world_kind: str, series: Series, sizes: Sizes
-) -> tuple[float, float]:
-    first, second = (
-        by_condition[Condition(world_kind, *design, n)].estimates[series.measure].mean
-        for design, n in zip((series.first, series.second), sizes, strict=True)
-    )
-    return first, second
 
 
 def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:

@@ -88,16 +88,10 @@ def draw_policies(behaviours: np.ndarray, colours: dict[str, str]) -> Figure:
     x, y = np.divmod(np.arange(len(behaviours)), 5)
     dots = [colours[_STEP]] * walks + [colours[_LOOP]] * (len(behaviours) - walks)
     axes.scatter(x, -y, s=36, c=dots, linewidths=0)
-    axes.text(0, -5.6, f"{walks} walk the trail", color=colours[_STEP], fontsize=9, weight="bold")
-    axes.text(
-        19.3,
-        -5.6,
-        f"{circles} circle at the queen",
-        color=colours[_LOOP],
-        fontsize=9,
-        ha="right",
-        weight="bold",
-    )
+    look: dict[str, Any] = {"fontsize": 9, "weight": "bold"}
+    axes.text(0, -5.6, f"{walks} walk the trail", color=colours[_STEP], **look)
+    words = f"{circles} circle at the queen"
+    axes.text(19.3, -5.6, words, color=colours[_LOOP], ha="right", **look)
     axes.set(xlim=(-0.5, 19.8), ylim=(-6.2, 0.6))
     return figure
 

@@ -29,13 +29,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants import AntsError, Colony, Pheromone, Task, TrainingConfig, World, files, task
     from taichi_ants.analysis.statistics import bootstrap_interval
     from taichi_ants.learners.policies import FOLLOWED, RULES, trail_follower
-    from taichi_ants.studies.command_line import (
-        Parser,
-        add_threads,
-        progress_bar,
-        run_command,
-        whole_number,
-    )
+    from taichi_ants.studies import command_line
+    from taichi_ants.studies.command_line import whole_number
     from taichi_ants.studies.points import EVALUATION_SEEDS, Drawn
 
     if TYPE_CHECKING:
@@ -71,7 +66,7 @@ Learned = Mapping[tuple[str, str, int, str], Mapping[int, float]]
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
-    parser = Parser(__doc__)
+    parser = command_line.Parser(__doc__)
     add = parser.add_argument
     worlds = {"nargs": "+", "choices": tuple(WORLDS), "metavar": "NAME"}
     worlds["default"] = tuple(WORLD_KINDS)
@@ -83,7 +78,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--epsilon", type=float, nargs="+", default=[0.0, 0.01], metavar="X", help=epsilons)
     study = "results folder of colony.py study to compare with"
     add("--study", type=Path, metavar="FOLDER", help=study)
-    add_threads(parser)
+    command_line.add_threads(parser)
     return parser.parse_args(arguments)
 
 
@@ -92,7 +87,7 @@ def print_table(settings: argparse.Namespace) -> None:
     learned = read_study(settings.study) if settings.study else {}
     rows: list[str] = []
     choices = list(product(settings.worlds, TASKS, settings.epsilon))
-    with progress_bar("Ants with a fixed rule") as progress:
+    with command_line.progress_bar("Ants with a fixed rule") as progress:
         for kind, name, epsilon in choices:
             ants = LARGE_SIZE if kind == "large" else settings.ants
             world, seeds = world_of(kind), range(settings.seeds)
@@ -173,4 +168,4 @@ def evaluate(
 
 
 if __name__ == "__main__":
-    run_command(lambda: print_table(parse_arguments()))
+    command_line.run_command(lambda: print_table(parse_arguments()))

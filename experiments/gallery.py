@@ -76,12 +76,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    add(
-        "--folder",
-        type=Path,
-        default=ROOT,
-        help="write the folders renders/ and docs/figures/ here",
-    )
+    folder = "write the folders renders/ and docs/figures/ here"
+    add("--folder", type=Path, default=ROOT, help=folder)
     skip = "make only renders/ and the pictures of pages, which takes half a minute"
     add("--no-figures", action="store_true", help=skip)
     return parser.parse_args(arguments)

@@ -14,6 +14,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     import io
     import math
+    from collections import namedtuple
     from collections.abc import Iterator
     from dataclasses import dataclass, field
     from itertools import pairwise
@@ -78,23 +79,8 @@ LEVEL = 600  # of a fresh trail
 STROKE = 24  # ticks in which it is drawn
 
 
-@dataclass(frozen=True)
-class Look:
-    """The colours of one theme."""
-
-    page: int
-    floor: int
-    trail: int
-    rock: int
-    rim: int
-    wall: int
-    ant: int
-    food: int
-    nest: int
-    ink: int
-    faint: int
-
-
+# The colours of one theme.
+Look = namedtuple("Look", "page floor trail rock rim wall ant food nest ink faint")
 LOOKS = {
     "dark": Look(
         *(0x0D1117, 0x18232D, 0x2FA9BC, 0x46545F, 0x8296A3, 0xD7DEE2),

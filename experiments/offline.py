@@ -16,28 +16,18 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     from collections.abc import Callable
     from dataclasses import replace
+    from functools import partial
     from pathlib import Path
 
     import numpy as np
 
-    from taichi_ants import (
-        Colony,
-        Dataset,
-        Life,
-        Task,
-        TrainingConfig,
-        evaluate,
-        load_policy,
-        offline,
-        record,
-        record_colony,
-        train,
-        worlds,
-    )
+    from taichi_ants import Colony, TrainingConfig, evaluate, load_policy, offline, train, worlds
     from taichi_ants.analysis.statistics import bootstrap_interval
-    from taichi_ants.analysis.tables import Table, interval, markdown, number, plain_text
+    from taichi_ants.analysis.tables import Table, interval, number, plain_text
     from taichi_ants.learners.policies import random_policy, trail_follower
+    from taichi_ants.offline import Dataset, record, record_colony
     from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+    from taichi_ants.task import Life, Task
 
     WORLD = worlds.paper()
     FORAGING = load_policy(Path(__file__).parent / "policies" / "foraging.npz")
@@ -55,9 +45,9 @@ SIZES = (1000, 3000, 10_000, 30_000, 100_000)
 HORIZON, DISCOUNT, EPSILON = 100, 0.95, 0.1
 INTERVALS = {"resamples": 40, "level": 0.9}
 JUDGES: dict[str, Callable[..., offline.PolicyValues]] = {
-    "importance sampling": lambda *given: _sampled(*given, weighted=False),
-    "weighted": lambda *given: _sampled(*given, weighted=True),
-    "model": lambda *given: offline.model_based(*given, **INTERVALS),
+    "importance sampling": partial(offline.importance_sampling, weighted=False, **INTERVALS),
+    "weighted": partial(offline.importance_sampling, weighted=True, **INTERVALS),
+    "model": partial(offline.model_based, **INTERVALS),
 }
 
 # Colonies of 64 ants, three far piles; those with a lifespan have births.
@@ -67,15 +57,8 @@ LIFESPANS, TICKS, COLONY_SIZES = (None, 100, 50), 250, (3000, 15_000)
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
-    add = parser.add_argument
-    add(
-        "--seeds",
-        type=whole_number(2),
-        default=10,
-        metavar="N",
-        help="number of seeds, starting at 0",
-    )
-    add("--markdown", action="store_true", help="print tables as Markdown")
+    seeds = "number of seeds, starting at 0"
+    parser.add_argument("--seeds", type=whole_number(2), default=10, metavar="N", help=seeds)
     return parser.parse_args(arguments)
 
 
@@ -85,8 +68,7 @@ def print_tables(settings: argparse.Namespace) -> None:
     for title, table_of in (("data", learning), ("evaluation", judging), ("colonies", dying)):
         with progress_bar(title) as progress:
             table = table_of(seeds, progress)
-        text = markdown([table]) if settings.markdown else plain_text([table], 120)
-        print(text, flush=True)
+        print(plain_text([table], 120), flush=True)
 
 
 def shown(values: np.ndarray, digits: int = 2) -> str:
@@ -165,10 +147,6 @@ def judging(seeds: range, progress: Callable[[float], None]) -> Table:
 
 def _returns(table: np.ndarray, episodes: int, seed: int, epsilon: float) -> np.ndarray:
     return record(WORLD, table, episodes, seed, 600, STILL, epsilon).returns(DISCOUNT)
-
-
-def _sampled(*given: object, weighted: bool) -> offline.PolicyValues:
-    return offline.importance_sampling(*given, weighted=weighted, **INTERVALS)
 
 
 def _scores(found: offline.PolicyValues, true: np.ndarray) -> tuple[float, ...]:

@@ -20,16 +20,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
     from taichi_ants.grid.hexgrid import centre_of
     from taichi_ants.learners.policies import checked_table
-    from taichi_ants.rendering import colours, save_picture, text
+    from taichi_ants.rendering import colours, rasteriser, save_picture, text
     from taichi_ants.rendering.colours import Mark
-    from taichi_ants.rendering.rasteriser import (
-        CELL_LETTERS,
-        ants,
-        cell,
-        cell_colour,
-        draw_marks,
-        marks,
-    )
     from taichi_ants.rendering.scene import fill, name_parts
     from taichi_ants.rendering.writers import check_file
     from taichi_ants.studies.command_line import Parser, given_world, run_command
@@ -175,7 +167,7 @@ class StateDrawing:
         *_, letters = name_parts(self._observation, state)
         if letters:
             letters.insert(0, letters.pop(self._observation.cells.index(0)))
-        return [*(CELL_LETTERS.find(letter[0]) for letter in letters), state]
+        return [*(rasteriser.CELL_LETTERS.find(letter[0]) for letter in letters), state]
 
     def draw(self, state: int, actions: list[int]) -> np.ndarray:
         """Return the picture of a state, uint8 (height, width, 3)."""
@@ -183,15 +175,17 @@ class StateDrawing:
         task, rest, letters = name_parts(self._observation, state)
         carries, radius = np.array([task == TASK_NAMES[1]]), 0.96 * _HEXAGON
         seen = list(zip(letters or ["E"] * len(self._seen), self._seen, strict=True))
-        cells = [cell(letter, centre, radius) for letter, centre in [("E", self._own), *seen]]
-        ant = ants(self._own + (0, 0.2 * _HEXAGON), 0, carries, _HEXAGON, 0.62 * _HEXAGON)
-        draw_marks(frame, *cells, ant, *self._arrows(letters, actions))
+        shown = [("E", self._own), *seen]
+        cells = [rasteriser.cell(letter, centre, radius) for letter, centre in shown]
+        place = self._own + (0, 0.2 * _HEXAGON)
+        ant = rasteriser.ants(place, 0, carries, _HEXAGON, 0.62 * _HEXAGON)
+        rasteriser.draw_marks(frame, *cells, ant, *self._arrows(letters, actions))
         if not letters:  # the name has no letters of cells
             text.write(frame, rest, _TILE / 2, _SMALL, _SMALL, align="middle", room=_TILE)
         for letter, (x, y) in seen if letters else ():
             if letter not in _GOALS:
                 place = x, y - 0.12 * _HEXAGON
-                text.write_on(frame, letter, place, _HEXAGON, cell_colour(letter))
+                text.write_on(frame, letter, place, _HEXAGON, rasteriser.cell_colour(letter))
         return frame
 
     def _arrows(self, letters: list[str], actions: list[int]) -> Iterator[np.ndarray]:
@@ -206,7 +200,7 @@ class StateDrawing:
                     heading = self._headings[place] + (3 if action == PICK_UP else 0)
                     middle = 0.55 * self._own + 0.45 * self._seen[place]
                     colour = _ARROW_COLOURS.get(action, colours.CHOSEN)
-                    yield marks(middle, 0.37 * _HEXAGON, Mark.ARROW, colour, heading)
+                    yield rasteriser.marks(middle, 0.37 * _HEXAGON, Mark.ARROW, colour, heading)
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:

@@ -29,13 +29,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.grid.constants import N_HEADINGS, STREAM_FORAGER
     from taichi_ants.grid.randomness import stream_state
     from taichi_ants.settings import Count, Seed, Setting, Share, checked_arguments
-    from taichi_ants.studies.command_line import (
-        Parser,
-        add_threads,
-        progress_bar,
-        run_command,
-        whole_number,
-    )
+    from taichi_ants.studies import command_line
+    from taichi_ants.studies.command_line import whole_number
     from taichi_ants.task.rules.policy import bit_number
 
 SIZE = (30, 30, 30)
@@ -259,7 +254,7 @@ def forage(
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
-    parser = Parser(__doc__)
+    parser = command_line.Parser(__doc__)
     add = parser.add_argument
     number = whole_number(1, 100_000)
     room = "largest number of ants in a cell; several are run in turn"
@@ -276,7 +271,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     }
     for flag, (default, words) in shares.items():
         add(flag, type=float, default=default, metavar="X", help=words)
-    add_threads(parser)
+    command_line.add_threads(parser)
     return parser.parse_args(arguments)
 
 
@@ -284,7 +279,7 @@ def print_table(settings: argparse.Namespace) -> None:
     """Print a row for each kind of world and each --room, after building all worlds."""
     maps = {kind: [build(n) for n in range(settings.seeds)] for kind, build in WORLDS.items()}
     rows: list[str] = []
-    with progress_bar("Ants that back up utilities") as progress:
+    with command_line.progress_bar("Ants that back up utilities") as progress:
         for kind, room in product(WORLDS, settings.room):
             outcomes = [run(settings, world, n, room) for n, world in enumerate(maps[kind])]
             rows.append(f"{kind:6} {room:5} {row(outcomes)}")
@@ -318,4 +313,4 @@ def row(outcomes: list[Foraging]) -> str:
 
 
 if __name__ == "__main__":
-    run_command(lambda: print_table(parse_arguments()))
+    command_line.run_command(lambda: print_table(parse_arguments()))

@@ -125,7 +125,7 @@ class When(ProtocolEvent, path="when"):
 
     def check(self) -> None:
         super().check()
-        measures.get(self.measure).check_single_state("`when.measure`")
+        measures.get(self.measure).check_state("`when.measure`")
         if (self.above is None) == (self.below is None):
             raise AntsError("`when` needs a bound; give either `above` or `below`.")
 

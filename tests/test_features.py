@@ -24,7 +24,6 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.analysis.bounds.episodes import EpisodeBounds
-from taichi_ants.analysis.bounds.limits import limits_of
 from taichi_ants.engines.runs.training import trace_policies
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
@@ -87,7 +86,6 @@ COLONIES = {
 OTHERS = {
     "form": form,
     "record_colony": record_from,
-    "limits_of": lambda rules: limits_of(WORLD, rules),
     "EpisodeBounds": lambda rules: EpisodeBounds(WORLD, rules),
 }
 ALL = {**LONE_RUNS, **ENVIRONMENTS, **COLONIES, **OTHERS}
@@ -103,12 +101,11 @@ def test_a_new_feature_is_refused_wherever_no_set_names_it(who):
         ALL[who](ToyTask(toy=True))
 
 
-BOUNDS = ["EpisodeBounds", "limits_of"]
 REFUSED = [  # changes of the paper's task, the words of the message, and who does not support it
     (
         {"life": {"births": True}},
         "`task.life.births` is True",
-        [*LONE_RUNS, *BOUNDS, "HexForageEnv", "HexColonyVectorEnv"],
+        [*LONE_RUNS, "EpisodeBounds", "HexForageEnv", "HexColonyVectorEnv"],
     ),
     ({"life": {"regrowth": 0}}, "`task.life.regrowth` is 0", [*LONE_RUNS, "EpisodeBounds"]),
     (
@@ -147,7 +144,6 @@ def test_features_are_refused_where_they_are_not_supported(changes, words, who):
 @pytest.mark.parametrize("run", [
     lambda: train(NESTS, LEARNER, 0, 1),
     lambda: HexForageEnv(NESTS),
-    lambda: limits_of(NESTS),
     lambda: EpisodeBounds(NESTS, Task()),
     lambda: record_colony(Colony(NESTS, Task(), LEARNER)),
 ])  # fmt: skip

@@ -163,11 +163,7 @@ def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str,
     }
 
 
-def save_all(comparison: Comparison, baselines: Sequence[Baseline], folder: Path) -> None:
-    """Write all figures as files."""
+def save_all(comparison: Comparison, baselines: Sequence[Baseline], folder: Path) -> list[Drawing]:
+    """Write all figures as files, and return them for the page."""
     style.save_all(draw_all(comparison, baselines), folder)
-
-
-def for_page(comparison: Comparison, baselines: Sequence[Baseline]) -> list[Drawing]:
-    """Return new figures for the page, because saving a figure as a file changes its layout."""
-    return drawings(draw_all(comparison, baselines))
+    return drawings(draw_all(comparison, baselines))  # anew, because saving changes their layout

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -76,10 +75,18 @@ def begin(
     """Return a function that waits for all figures, recordings and, if `renders`, animations.
 
     This process follows the policies, because it has compiled the kernel. The second process begins
-    with the recordings; this one draws figures, and then what the second has not begun.
+    with the figures, for which it does not start Taichi; this one begins with the last calls.
     """
     played = [example.played() for example in examples]
-    calls: dict[Any, process.Begun] = {}
+    drawn = process.begin(figures.save_all, comparison, baselines, folder / "figures")
+    calls: dict[Any, process.Begun] = {"figures": drawn}
+    for (row, run, point, *_), episode in zip(examples, played if renders else (), strict=False):
+        path = files.check_writable_folder(folder / "renders")
+        path /= f"{example_name(comparison, row, run)}.gif"
+        # The animation shows the name of the episode next to the world.
+        named = replace(episode, name=BEHAVIOURS[comparison.behaviours[row, run]])
+        title = f"{comparison.rows[row].variant.label}, {point.task.delivery}"
+        calls[path] = process.begin(render, path, named, title)
     first: dict[int, tuple[Example, Episode]] = {}
     for example, episode in zip(examples, played, strict=True):
         first.setdefault(int(comparison.behaviours[example.row, example.run]), (example, episode))
@@ -98,23 +105,13 @@ def begin(
             title, task = f"{variant.label}: policy", example.point.task
             captions["sheet"] = "", f"The policy of an ant: {whose}"
             calls["sheet"] = process.begin(policy_sheet, example.q_values, title, task=task)
-    draw = partial if renders else process.begin
-    calls["figures"] = draw(figures.save_all, comparison, baselines, folder / "figures")
-    for (row, run, point, *_), episode in zip(examples, played if renders else (), strict=False):
-        path = files.check_writable_folder(folder / "renders")
-        path /= f"{example_name(comparison, row, run)}.gif"
-        # The animation shows the name of the episode next to the world.
-        named = replace(episode, name=BEHAVIOURS[comparison.behaviours[row, run]])
-        title = f"{comparison.rows[row].variant.label}, {point.task.delivery}"
-        calls[path] = process.begin(render, path, named, title)
-    calls["drawings"] = draw(figures.for_page, comparison, baselines)
 
     def wait() -> Seen:
         with progress_bar("pictures") as progress:
             results = process.results_of(calls, progress)
         players = [Player(*captions[code], results[code]) for code in sorted(first)]
         sheet = Picture(captions["sheet"][1], results["sheet"]) if "sheet" in results else None
-        return Seen(results["drawings"], players, sheet)
+        return Seen(results["figures"], players, sheet)
 
     return wait
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _RESAMPLES = 4000  # of figures, which have many intervals
-_MOST_LINES = 8
-_NO_NUMBERS = "the result has no measures that are numbers; run the colony with other measures."
 _WIDE = 100  # the number of columns of a table in a terminal
 _EPISODES, _TICKS = "episode", "tick"
 
@@ -114,8 +112,7 @@ def compare(
     values = []
     tables = _tables_of({"a": a, "b": b}).values()
     for table, number in zip(tables, configurations, strict=True):
-        most = len(table.groups) - 1
-        group = checked_whole("a configuration", number, least=0, most=max(0, most))
+        group = checked_whole("a configuration", number, 0, len(table.groups) - 1)
         values.append(of_seeds(table, measure, last)[group])
     both = ~np.isnan(values[0] - values[1])
     if not both.any():
@@ -124,14 +121,8 @@ def compare(
     differences = first - second
     low, high = (float(end[0]) for end in bootstrap_interval(differences))
     return Comparison(
-        measure=measure,
-        first=float(first.mean()),
-        second=float(second.mean()),
-        difference=float(differences.mean()),
-        low=low,
-        high=high,
-        seeds=len(differences),
-        differences=tuple(differences.tolist()),
+        *(measure, float(first.mean()), float(second.mean()), float(differences.mean())),
+        *(low, high, len(differences), tuple(differences.tolist())),
     )
 
 
@@ -146,8 +137,6 @@ def summary(result: Tidy, last: int | None = None) -> Summary:
     """
     expect("result", result, Tidy)
     table, rows = result.measured(), []
-    if not table.values:
-        raise AntsError(_NO_NUMBERS)
     for name in table.values:
         for group, values in zip(table.groups, of_seeds(table, name, last), strict=True):
             ((mean, low, high, *_),) = estimates(values[None], uses_iqm=False)
@@ -180,39 +169,34 @@ def plot(
     if path is not None:
         expect("path", path, str, Path)
         check_one_of("the suffix of path", Path(path).suffix, (".png",))
-    named = results if isinstance(results, Mapping) else {"result": results}
-    table = _together(_tables_of(named))
-    names = [part for name in measures for part in parts_of(table, name)] or list(table.plotted)
+    tables = _tables_of(results if isinstance(results, Mapping) else {"": results})
+    first, *others = tables.values()
+    names = [part for name in measures for part in parts_of(first, name)]
+    names = names or [n for n in first.plotted if all(n in table.values for table in others)]
     if not names:
-        raise AntsError(_NO_NUMBERS)
-    if len(table.groups) > _MOST_LINES:
-        raise AntsError(
-            f"the result has {len(table.groups)} configurations; a figure shows at most "
-            f"{_MOST_LINES}, so plot the columns of to_pandas()."
-        )
+        raise AntsError("the results have no measure in common; name other results.")
     # An episode of a seed has several rows if there are series.
-    across = _EPISODES if last_rows(table).all() else _TICKS
+    across = _EPISODES if all(last_rows(table).all() for table in tables.values()) else _TICKS
+    labels = [f"{name} {group}".strip() for name, table in tables.items() for group in table.groups]
     with style.styled():
         figure = style.new_figure(1.2 + 1.8 * len(names))
         panels = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
         for axes, name in zip(panels, names, strict=True):
-            for number, (x, values) in enumerate(curves(table, name, across)):
-                colour = style.COLOURS[number % len(style.COLOURS)]
+            lines = (line for table in tables.values() for line in curves(table, name, across))
+            looks = itertools.cycle(style.COLOURS)
+            for label, colour, (x, values) in zip(labels, looks, lines, strict=False):
                 rows = estimates(values, uses_iqm=False, resamples=_RESAMPLES)
                 mean, low, high = np.array([row[:3] for row in rows]).reshape(-1, 3).T
                 marker = "o" if len(x) < 2 else None
-                axes.plot(
-                    x, mean, color=colour, marker=marker, label=style.label(table.groups[number])
-                )
+                axes.plot(x, mean, color=colour, marker=marker, label=style.label(label))
                 axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
-            unit = table.units.get(name, "")
+            unit = first.units.get(name, "")
             whole, _, part = name.partition(".")
             words = sentence(whole.replace("_", " ")) + (f" ({part})" if part else "")
             axes.set_ylabel(f"{words},\n{unit}" if unit else words)
         panels[-1].set_xlabel(sentence(across))
-        several = len(table.groups) > 1
-        entries = style.legend_entries([panels[0]]) if several else {}
-        caption = f"{means_in_words(len(table.seeds))}."
+        entries = style.legend_entries([panels[0]]) if labels[1:] else {}
+        caption = f"{means_in_words(len(first.seeds))}."
         style.frame(figure, f"Measures by {across}", caption, entries)
     if path is not None:
         style.save(figure, Path(path))
@@ -232,31 +216,6 @@ def _tables_of(results: Mapping[str, Tidy]) -> dict[str, Measured]:
                 f"{shown(tables[first].seeds)}; use the same seeds in the same order."
             )
     return tables
-
-
-def _together(tables: Mapping[str, Measured]) -> Measured:
-    """Return named tables as one, whose configurations are those of all tables."""
-    every = tables.values()
-    first = next(iter(every))
-    if len(every) == 1:
-        return first
-    common = [name for name in first.values if all(name in table.values for table in every)]
-    groups = [f"{name} {group}".strip() for name, table in tables.items() for group in table.groups]
-    ends = list(itertools.accumulate(len(table.groups) for table in every))
-    of_group = [t.of_group + end - len(t.groups) for t, end in zip(every, ends, strict=True)]
-    return Measured(
-        index={
-            name: np.concatenate([table.index[name] for table in every])
-            for name in ("seed", _EPISODES, _TICKS)
-        },
-        values={name: np.concatenate([t.values[name] for t in every]) for name in common},
-        of_seed=np.concatenate([table.of_seed for table in every]),
-        of_group=np.concatenate(of_group),
-        seeds=first.seeds,
-        groups=tuple(groups),
-        plotted=tuple(name for name in first.plotted if name in common),
-        units=first.units,
-    )
 
 
 def of_seeds(table: Measured, measure: str, last: int | None = None) -> np.ndarray:

@@ -19,9 +19,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = command_line.Parser(__doc__)
     parser.add_argument("file", type=Path, metavar="FILE", help="sweep to run (.toml)")
-    command_line.add_common(parser)
-    command_line.add_machines(parser)
-    command_line.add_results(parser, "sweep-NAME for the file NAME.toml", quick=False)
+    command_line.add_study(parser, "sweep-NAME for the file NAME.toml")
     also = "write the tables as Parquet, too (extra parquet)"
     parser.add_argument("--parquet", action="store_true", help=also)
     settings = parser.parse_args(arguments)

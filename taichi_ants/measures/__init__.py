@@ -7,11 +7,8 @@ your own. docs/measures.md lists the built-in ones.
 from taichi_ants.measures.built_in import BUILT_IN, shortest_path
 from taichi_ants.measures.finished import Run
 from taichi_ants.measures.measure import Measure
-from taichi_ants.measures.registry import check_part, get, names, register
+from taichi_ants.measures.registry import get, names, register
 from taichi_ants.measures.series import Series
 
-__all__ = [
-    "BUILT_IN", "Measure", "Run", "Series", "check_part", "get", "names", "register",
-    "shortest_path",
-]  # fmt: skip
+__all__ = ["BUILT_IN", "Measure", "Run", "Series", "get", "names", "register", "shortest_path"]
 __dir__ = __all__.copy  # completion lists only public names

@@ -1,4 +1,4 @@
-"""The measures of the package of the state of a colony, of its counts, and of series.
+"""The measures of the package of the state of a colony, and of its counts.
 
 Measures of `counts` take numbers or arrays, so they also measure lone ants and finished runs.
 """
@@ -17,11 +17,9 @@ from taichi_ants.features import FEATURES
 from taichi_ants.measures.measure import COUNTS, Measure
 from taichi_ants.task.constants import FOOD, OBSTACLE, QUEEN
 from taichi_ants.task.events import Event
-from taichi_ants.task.field import TRAIL
 
 if TYPE_CHECKING:
     from taichi_ants.records import Snapshot
-    from taichi_ants.task import Task
     from taichi_ants.worlds.world import World
 
 Counts = Mapping[str, Any]
@@ -35,16 +33,6 @@ def ratio(part: Any, whole: Any) -> Any:
 def share_of(which: np.ndarray) -> float:
     """Return the share of true entries; nan for an empty array."""
     return int(np.count_nonzero(which)) / len(which) if len(which) else math.nan
-
-
-def _new_deliveries(values: np.ndarray, snapshot: Snapshot) -> float:
-    return values[-1] - values[-2] if len(values) > 1 else values[-1]
-
-
-def _owners(world: World, task: Task) -> tuple[str, ...]:
-    """Return the names of the parts of `deliveries_by`."""
-    numbers = {"nest": len(world.queens), "food": len(task.foods), "caste": len(task.castes)}
-    return tuple(f"{owner}_{i}" for owner, n in numbers.items() for i in range(max(n, 1)))
 
 
 def _deliveries_by(counts: Counts) -> dict[str, Any]:
@@ -135,63 +123,29 @@ def activity(snapshot: Snapshot) -> float:
     return share_of((events == Event.ENTERED_EMPTY) | (events == Event.ENTERED_CUE))
 
 
-def synchrony(values: np.ndarray, snapshot: Snapshot) -> float:
-    """Return how much more the `activity` varies over time than that of independent ants.
-
-    It is n v / (m (1 - m)), the binomial index of dispersion, for n living ants. The mean m and the
-    variance v are those of the activity in the rows of the episode so far, without rows in which no
-    ant lives. The variance is divided by their number. Independent ants with equal, constant
-    activity give about 1. Ants that all move or rest together give n. Studies of activity cycles
-    in ants, such as Cole [1]_, look at the same series, the share of active ants. The value is nan
-    with fewer than two such rows, without ants, and if m is 0 or 1.
-
-    .. [1] B. J. Cole (1991), Short-term activity cycles in ants: generation of periodicity by
-       worker interaction, American Naturalist 137, 244-259.
-    """
-    shares, n = values[~np.isnan(values)].tolist(), len(snapshot.ant_cells)
-    if len(shares) < 2:
-        return math.nan
-    mean = math.fsum(shares) / len(shares)
-    if not n or not 0 < mean < 1:
-        return math.nan
-    variance = math.fsum((share - mean) ** 2 for share in shares) / len(shares)
-    return n * variance / (mean * (1 - mean))
-
-
 def _distance(snapshot: Snapshot) -> float:
     if not len(snapshot.ant_cells):
         return math.nan
     return int(snapshot.distances[snapshot.ant_cells].sum(dtype=np.int64)) / len(snapshot.ant_cells)
 
 
-def regions_of(world: World | None) -> Mapping[str, np.ndarray]:
-    """Return the cells of the regions of a world by name; AntsError if it has none."""
-    if world is None or not world.regions:
+def _regions(snapshot: Snapshot) -> dict[str, float]:
+    if snapshot.world is None or not snapshot.world.regions:
         raise AntsError(
             "the measure 'regions' needs a world with regions; add them with World.with_regions, "
             "or with a table [world.regions] in a sweep file."
         )
-    return world.regions
-
-
-def _regions(snapshot: Snapshot) -> dict[str, float]:
     return {
         name: share_of(np.isin(snapshot.ant_cells, snapshot.grid.index(cells)))
-        for name, cells in regions_of(snapshot.world).items()
+        for name, cells in snapshot.world.regions.items()
     }
-
-
-def _occupancy(snapshot: Snapshot) -> np.ndarray:
-    return np.bincount(snapshot.ant_cells, minlength=snapshot.grid.size).astype(np.int32)
 
 
 _LISTED = (
     Measure("deliveries", lambda c: c["deliveries"], "food items",
             "deliveries since the start of the episode", COUNTS),
-    Measure("new_deliveries", _new_deliveries, "food items",
-            "deliveries since the last row of the series", "deliveries"),
     Measure("deliveries_by", _deliveries_by, "food items",
-            "deliveries by nest, kind of food and caste", COUNTS, parts=_owners),
+            "deliveries by nest, kind of food and caste", COUNTS),
     Measure("first_delivery", first_delivery, "ticks",
             "first passage time; if there is none, ticks so far", COUNTS),
     Measure("efficiency", lambda c: ratio(c["deliveries"], c["ticks"] * c["living"]),
@@ -200,13 +154,10 @@ _LISTED = (
             COUNTS),
     Measure("path_ratio", _path_ratio, "", "path length divided by that of the shortest path"),
     Measure("entropy", entropy, "",
-            "entropy of each pheromone field, 0 (one cell) to 1 (equal levels)",
-            parts=lambda world, task: (TRAIL, *task.fields)),
+            "entropy of each pheromone field, 0 (one cell) to 1 (equal levels)"),
     Measure("blocked_share", lambda c: ratio(c["blocked"], c["moves"]), "",
             "share of the moves that failed", COUNTS),
     Measure("activity", activity, "", "share of the ants that moved in the last tick"),
-    Measure("synchrony", synchrony, "", "variance of the activity, relative to independent ants",
-            "activity"),
     Measure("living", lambda c: c["living"], "ants", "number of living ants", COUNTS),
     Measure("waiting_births", lambda c: c["waiting_births"], "ants",
             "births that wait for a free cell or slot", COUNTS),
@@ -215,9 +166,6 @@ _LISTED = (
     *(Measure(name, *measured) for feature in FEATURES
       for name, measured in feature.measures.items()),
     Measure("distance", _distance, "steps", "mean distance of the ants to the nearest queen"),
-    Measure("regions", _regions, "", "share of the ants in each region of the world",
-            parts=lambda world, task: tuple(regions_of(world))),
-    Measure("occupancy", _occupancy, "ants", "number of ants on each cell (an array)",
-            is_array=True),
+    Measure("regions", _regions, "", "share of the ants in each region of the world"),
 )  # fmt: skip
 BUILT_IN: dict[str, Measure] = {measure.name: measure for measure in _LISTED}

@@ -196,9 +196,7 @@ def of_runs(kind: str, name: str) -> Measure:
 
 def _registered(kind: str) -> set[str]:
     """Return the names of registered measures that are measures of runs of a kind as they are."""
-    is_state = kind == "colony"
-    every = {name: get(name) for name in MEASURES.names()}
-    return {name for name, m in every.items() if m.of == RUN or (is_state and not m.is_array)}
+    return {name for name in MEASURES.names() if kind == "colony" or get(name).of == RUN}
 
 
 def names_of(kind: str) -> str:

@@ -6,19 +6,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from taichi_ants.errors import AntsError, shown
 
-if TYPE_CHECKING:
-    from taichi_ants.task import Task
-    from taichi_ants.worlds.world import World
-
-COUNTS, RUN = "counts", "run"  # values of `of` that do not name a measure
-# A number, numbers by the names of parts, or an array.
-Value = float | Mapping[str, float] | np.ndarray
+COUNTS, RUN = "counts", "run"  # values of `Measure.of`
 
 
 @dataclass(frozen=True)
@@ -27,16 +21,13 @@ class Measure:
 
     Attributes:
         name: The name, with the part after a point: "entropy" or "entropy.trail".
-        function: A function that returns a number, numbers by the names of parts, or an array.
+        function: A function that returns a number, or numbers by the names of parts.
         unit: The unit of the value, for axes and tables; "" if it has none.
         summary: A short description for lists.
-        of: The arguments of the function. None: the `Snapshot` of a world, with read-only arrays in
+        of: The argument of the function. None: the `Snapshot` of a world, with read-only arrays in
             a run. "counts": the counts of an episode by name, integers in `Snapshot.counts` and
-            arrays of episodes in finished runs, so the measure works for lone ants, too. The name
-            of another measure: its values in the episode so far, float64 (n,), and the snapshot.
-            "run": a `Run`; the value is then float64 (...) with the number of each run.
-        parts: A function of a world and a task that returns the names of the parts.
-        is_array: Whether the value is an array.
+            arrays of episodes in finished runs, so the measure works for lone ants, too. "run": a
+            `Run`; the value is then float64 (...) with the number of each run.
         episodes: The fewest episodes of training that a measure of a run needs.
     """
 
@@ -45,8 +36,6 @@ class Measure:
     unit: str = ""
     summary: str = ""
     of: str | None = None
-    parts: Callable[[World, Task], tuple[str, ...]] = lambda world, task: ()
-    is_array: bool = False
     episodes: int = 0
 
     @property
@@ -60,42 +49,35 @@ class Measure:
         """Whether tables of finished runs have an IQM; shares and counts have only a mean."""
         return self.of == RUN and self.unit in ("reward", "steps")
 
-    def check_single_state(self, where: str) -> None:
-        """Raise AntsError if it does not read a single state, which the caller has."""
-        if self.of not in (None, COUNTS):
-            needs = "finished runs" if self.of == RUN else f"the series of {self.of!r}"
+    def check_state(self, where: str) -> None:
+        """Raise AntsError unless it reads the state of a colony, which the caller has."""
+        if self.of == RUN:
             raise AntsError(
-                f"{where} is {self.name!r}, which needs {needs}; choose a measure of a single "
-                "state."
+                f"{where} is {self.name!r}, which needs finished runs; choose a measure of a state."
             )
 
     def __call__(self, snapshot: Any) -> float:
         """Return the value in a snapshot as one number.
 
         Raises:
-            AntsError: The measure does not read one state, is an array, or has several parts.
+            AntsError: The measure does not read a state, or has several parts.
         """
-        self.check_single_state("the measure")
-        value = self.read(snapshot)
-        if isinstance(value, Mapping) and len(value) == 1:
-            (value,) = value.values()
-        if not isinstance(value, float):
+        self.check_state("the measure")
+        numbers = self.read(snapshot)
+        if len(numbers) != 1:
             raise AntsError(
-                f"the measure {self.name!r} is not a number, but {shown(value)}; name one of its "
+                f"the measure {self.name!r} is not a number, but {shown(numbers)}; name one of its "
                 "parts after a point, or another measure."
             )
-        return value
+        return next(iter(numbers.values()))
 
-    def read(self, snapshot: Any, values: np.ndarray | None = None) -> Value:
-        """Return the value in a state: a float, floats by part, or an array.
-
-        `values` is the series of the measure that `of` names.
+    def read(self, snapshot: Any) -> dict[str, float]:
+        """Return the value in a state, or its parts, by their full names.
 
         Raises:
             AntsError: The function fails or returns something else, or the part does not exist.
         """
-        arguments = {None: [snapshot], COUNTS: [snapshot.counts]}.get(self.of, [values, snapshot])
-        value = self.computed(*arguments)
+        value = self.computed(snapshot.counts if self.of == COUNTS else snapshot)
         _, _, part = self.name.partition(".")
         if part:
             parts = value if isinstance(value, Mapping) else {}
@@ -103,11 +85,9 @@ class Measure:
                 known = ", ".join(map(str, parts)) or "no parts"
                 raise AntsError(f"{self.name!r} is not a part of the measure; it has {known}.")
             value = parts[part]
-        if isinstance(value, Mapping):
-            return {str(part): self._number(number) for part, number in value.items()}
-        if isinstance(value, np.ndarray) and value.ndim:
-            return value
-        return self._number(value)
+        elif isinstance(value, Mapping):
+            return {f"{self.name}.{part}": self._number(number) for part, number in value.items()}
+        return {self.name: self._number(value)}
 
     def computed(self, *arguments: Any) -> Any:
         """Return what the function returns; AntsError if it fails."""
@@ -122,13 +102,12 @@ class Measure:
             ) from error
 
     def _number(self, value: object) -> float:
-        if isinstance(value, np.ndarray) and value.ndim == 0:
-            value = value[()]
         if value is None:
             return math.nan
+        value = value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
         if not isinstance(value, (Real, np.bool_)) or math.isinf(value):
             raise AntsError(
                 f"the measure {self.name!r} returned {shown(value)}; it must return a finite "
-                "number, nan if it has no value, numbers by the names of parts, or an array."
+                "number, nan if it has no value, or numbers by the names of parts."
             )
         return float(value)

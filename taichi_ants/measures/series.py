@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.errors import AntsError, checked_whole
-from taichi_ants.measures.measure import COUNTS, RUN, Measure, Value
+from taichi_ants.measures.measure import Measure
 from taichi_ants.measures.registry import get
 from taichi_ants.records import Record
 
@@ -24,7 +24,6 @@ class Series(Record):
             of ticks since the episode began.
         values: The values of each measure by name, float64 (R,). Measures with parts have a name
             for each, as "entropy.trail". A value is nan if the measure has none.
-        maps: The values of measures that are arrays, (R, ...), for example "occupancy".
         units: The unit of each measure by name; "" if it has none.
     """
 
@@ -32,14 +31,13 @@ class Series(Record):
     episodes: np.ndarray
     ticks: np.ndarray
     values: Mapping[str, np.ndarray]
-    maps: Mapping[str, np.ndarray]
     units: Mapping[str, str]
 
     def __len__(self) -> int:
         return len(self.ticks)
 
     def __repr__(self) -> str:
-        return f"Series({len(self)} rows of {', '.join([*self.values, *self.maps])})"
+        return f"Series({len(self)} rows of {', '.join(self.values)})"
 
 
 class Recorder:
@@ -57,16 +55,12 @@ class Recorder:
         listed = [measures] if isinstance(measures, (str, Measure)) else measures
         self.measures = list({measure.name: measure for measure in map(get, listed)}.values())
         for measure in self.measures:
-            if measure.of == RUN:
-                measure.check_single_state("measures")
+            measure.check_state("measures")
         self.every = None if every is None else checked_whole("every", every)
         if self.every is not None and not self.measures:
             raise AntsError(f"every is {every}, but measures is empty; name at least one measure.")
-        # Measures whose values the series of others need.
-        of = [measure.of for measure in self.measures]
-        self._sources = {name: get(name) for name in of if name not in (None, COUNTS)}
         self._rows: list[tuple[int, int, int]] = []  # world, episode, tick
-        self._values: list[dict[str, Value]] = []  # of each row
+        self._values: list[dict[str, float]] = []  # of each row
         self._units: dict[str, str] = {}
         self.begin(0)
 
@@ -74,7 +68,6 @@ class Recorder:
         """Start a new episode, by its number in the run."""
         self._episode = episode
         self._read: dict[int, int] = {}  # the tick of the last row of each world
-        self._earlier: dict[tuple[int, str], list[float]] = {}
 
     def read(self, colony: Any) -> None:
         """Read measures of a `Colony`, except in worlds that did not change since the last row."""
@@ -82,20 +75,15 @@ class Recorder:
             if self._read.get(world) == tick:  # its episode has ended
                 continue
             self._read[world] = tick
-            snapshot, values = colony.snapshot(world), dict[str, Value]()
+            snapshot, values = colony.snapshot(world), dict[str, float]()
             named = (snapshot.fields, snapshot.of_ants)
             for array in (*vars(snapshot).values(), *(a for one in named for a in one.values())):
                 if isinstance(array, np.ndarray):  # all measures of the row read it
                     array.setflags(write=False)
-            for name, source in self._sources.items():
-                self._earlier.setdefault((world, name), []).append(source(snapshot))
             for measure in self.measures:
-                earlier = self._earlier.get((world, str(measure.of)))
-                value = measure.read(snapshot, None if earlier is None else np.array(earlier))
-                parts = value.items() if isinstance(value, Mapping) else [("", value)]
-                for part, number in parts:
-                    name = f"{measure.name}.{part}" if part else measure.name
-                    values[name], self._units[name] = number, measure.unit
+                numbers = measure.read(snapshot)
+                values |= numbers
+                self._units |= dict.fromkeys(numbers, measure.unit)
             self._rows.append((world, self._episode, tick))
             self._values.append(values)
 
@@ -103,16 +91,12 @@ class Recorder:
         """Return all rows so far; None without measures."""
         if not self.measures:
             return None
-        values: dict[str, np.ndarray] = {}
-        maps: dict[str, np.ndarray] = {}
-        for name in self._units:
-            column = [row.get(name, math.nan) for row in self._values]
-            if not any(isinstance(value, np.ndarray) for value in column):
-                values[name] = np.array(column, float)
-            else:
-                maps[name] = np.stack(column)  # type: ignore[arg-type]
+        values = {
+            name: np.array([row.get(name, math.nan) for row in self._values])
+            for name in self._units
+        }
         worlds, episodes, ticks = np.array(self._rows, np.int32).reshape(-1, 3).T.copy()
-        return Series(worlds, episodes, ticks, values, maps, dict(self._units))
+        return Series(worlds, episodes, ticks, values, dict(self._units))
 
 
 def stops(ticks: int, every: int | None) -> Iterator[int]:

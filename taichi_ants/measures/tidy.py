@@ -83,9 +83,8 @@ def parts_of(table: Measured, name: object) -> list[str]:
     parts = [column for column in table.values if column.startswith(f"{name}.")]
     if not parts:
         raise AntsError(
-            f"the result has no measure {name!r} that is a number; "
-            + (f"choose one of {', '.join(table.values)}, or " if table.values else "")
-            + "run the colony with measures=[...]."
+            f"the result has no measure {name!r}; choose one of {', '.join(table.values)}, or run "
+            "the colony with measures=[...]."
         )
     return parts
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
@@ -112,13 +112,3 @@ MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
         for name, of_ant in getattr(twin, "MEASURES", {}).items()
     },
 }
-
-
-def synchrony(rows: Sequence[float], ants: int) -> float:
-    """Return the variance of the activity in the rows, relative to that of independent ants."""
-    known = [row for row in rows if row == row]
-    mean = math.fsum(known) / len(known) if known else 0
-    if len(known) < 2 or ants == 0 or mean in (0, 1):
-        return NONE
-    squares = math.fsum((row - mean) * (row - mean) for row in known)
-    return ants * (squares / len(known)) / (mean * (1 - mean))

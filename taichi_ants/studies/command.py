@@ -144,7 +144,7 @@ def run_study(settings: Namespace, planned: Planned, report: bool = True) -> boo
     """Compute the results of a study unless its folder has them, and print the `report`.
 
     Args:
-        settings: The options of `command_line.add_common`, `add_machines` and `add_results`.
+        settings: The options of `command_line.add_study`.
         planned: The study.
 
     Returns:

@@ -119,10 +119,17 @@ def add_threads(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--threads", type=whole_number(1, 1024), metavar="N", help=words)
 
 
-def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) -> None:
-    """Add the options of commands with a folder of results; `with_folder` sets its default."""
-    add, place = parser.add_argument, f"results/{name}"
-    default = f"{place}, with --quick {place}-quick" if quick else place
+def add_study(parser: argparse.ArgumentParser, name: str, quick: str = "") -> None:
+    """Add the options of commands that run a study; `with_folder` sets the default of --out.
+
+    `name` is the name of the folder of results, and `quick` the help text of --quick, if any.
+    """
+    add_common(parser)
+    add_machines(parser)
+    add, default = parser.add_argument, f"results/{name}"
+    if quick:
+        add("--quick", action="store_true", help=quick)
+        default += f", with --quick {default}-quick"
     add("--out", type=Path, metavar="FOLDER", help=f"write the results here (default: {default})")
     add("--force", action="store_true", help="replace finished results in FOLDER")
     add("--no-figures", action="store_true", help="skip figures and animations")

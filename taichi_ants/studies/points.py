@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from taichi_ants import PHYSICS, __version__, arguments, files, learners, measures, worlds
+from taichi_ants import PHYSICS, __version__, arguments, files, learners, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.features.support import COLONY
 from taichi_ants.learners import policies
@@ -278,8 +278,6 @@ class ColonyPoint:
                     event.times(self.ticks)
                     for intervention in event.interventions:
                         intervention.check_in(world, self.task, learns)
-                    if isinstance(event, When):
-                        measures.check_part(event.measure, world, self.task, single=True)
                 except AntsError as error:
                     number = of_path.index(event) + 1
                     raise AntsError(
@@ -369,10 +367,6 @@ class ColonyPoint:
         )
         outcome = {name: files.small(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
         if (series := episodes.series) is not None:
-            for name in series.maps:
-                raise AntsError(
-                    f"the measure {name!r} is an array; choose measures that give numbers."
-                )
             shape = point.rollouts, -1, len(seeds)  # all worlds run for all ticks
             for name, values in series.values.items():
                 outcome[f"{SERIES}{name}"] = np.moveaxis(values.reshape(shape), -1, 0)

@@ -135,8 +135,6 @@ class Base(NamedTuple):
                 raise AntsError(
                     f"{name} needs {least} episodes; use more or choose another measure."
                 )
-            if isinstance(point, ColonyPoint):
-                measures.check_part(name, point.first_world, point.task)
         return point
 
 

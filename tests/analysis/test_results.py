@@ -201,13 +201,6 @@ def test_names_of_measures_are_those_of_run(series, tmp_path):
     )
 
 
-def test_results_without_numbers_are_refused():
-    arrays = run(measures=["occupancy"])
-    for attempt in (summary, plot, lambda result: plot(result, "occupancy")):
-        with pytest.raises(AntsError, match=r"numbers?; run the colony with"):
-            attempt(arrays)
-
-
 @pytest.mark.parametrize(
     ("attempt", "message"),
     [

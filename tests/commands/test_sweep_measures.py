@@ -180,7 +180,6 @@ training.learning_rate = [0.1, 0.2]
     ("old", "new", "words"),
     [
         ('"entropy"', '"entropi"', ["measures is 'entropi'", "entropy", "no_delivery_rate"]),
-        ('"entropy"', '"entropy.home"', ["'entropy.home' is not a part", "trail"]),
         ("measure_every = 25", "measure_every = 0", ["measure_every is 0"]),
         ("episodes = 0", "episodes = 2", ["'trail_follower'", "set episodes = 0"]),
         ('"trail_follower"', '"none.npz"', ["cannot read 'none.npz'"]),

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from colony import COMPARED, LEARNING, TASKS, conditions_of, greedy, plan, scheduled, with_bounds
 from colony_findings import ELSEWHERES, WORLD_KINDS, Condition
+from colony_limits import limits_of
 
 from taichi_ants import worlds
-from taichi_ants.analysis.bounds.limits import limits_of
 
 SEEDS = (3, 4)
 LENGTHS = {"episodes": 60, "ticks": 1000, "rollouts": 4}

@@ -34,9 +34,7 @@ def test_a_measure_of_a_snapshot_is_one_number():
     assert measures.get("entropy")(snapshot) == measures.get("entropy.trail")(snapshot) > 0
     for name, message in {
         "entropy.home": "it has trail",
-        "occupancy": "is not a number, but .*array",
-        "deliveries_by": r"is not a number, but \{'caste_0'",
-        "synchrony": "needs the series of 'activity'",
+        "deliveries_by": r"is not a number, but \{'deliveries_by.caste_0'",
         "deliveries.trail": "it has no parts",
     }.items():
         with pytest.raises(AntsError, match=message):
@@ -45,13 +43,10 @@ def test_a_measure_of_a_snapshot_is_one_number():
 
 def test_your_own_measure_is_read_as_the_others():
     measures.register("north", lambda s: np.count_nonzero(s.ant_headings == 0), "ants")
-    measures.register("growth", lambda values, s: np.ptp(values), of="north")
     measures.register("loads", lambda s: {"with": s.ant_carries.sum(), "without": None})
-    result = colony().run(1, 30, measures=["north", "growth", "loads", "loads.with"], every=10)
+    result = colony().run(1, 30, measures=["north", "loads", "loads.with"], every=10)
     values = result.series.values
-    assert list(values) == ["north", "growth", "loads.with", "loads.without"]
-    by_world = values["north"].reshape(3, 3)
-    assert values["growth"].reshape(3, 3)[-1].tolist() == np.ptp(by_world, axis=0).tolist()
+    assert list(values) == ["north", "loads.with", "loads.without"]
     assert np.isnan(values["loads.without"]).all()
     assert result.series.units["north"] == "ants"
 
@@ -74,9 +69,8 @@ def test_a_measure_of_counts_works_for_colonies_and_lone_ants():
 @pytest.mark.parametrize(
     ("name", "function", "more", "message"),
     [
-        ("counts", len, {}, "built-in measure"),
-        ("mine", lambda v, s: 1, {"of": "synchrony"}, "of is 'synchrony', which needs the series"),
-        ("mine", lambda v, s: 1, {"of": "nothing"}, "there is no measure 'nothing'"),
+        ("deliveries", len, {}, "built-in measure"),
+        ("mine", len, {"of": "activity"}, "of is 'activity'; it must be one of counts, run"),
     ],
 )
 def test_wrong_measures_are_refused(name, function, more, message):
@@ -89,6 +83,7 @@ def test_wrong_measures_are_refused(name, function, more, message):
     [
         (lambda s: "much", "returned 'much'; it must return a finite number"),
         (lambda s: {"a": "much"}, "returned 'much'"),
+        (lambda s: s.ant_cells, r"returned .*; it must return a finite number"),
         (lambda s: -math.inf, "returned -inf; it must return a finite number, nan"),
         (lambda s: s.nothing, "failed with AttributeError"),
         (lambda s: s.ground.fill(0), "failed with ValueError: .* read-only"),

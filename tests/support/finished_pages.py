@@ -12,7 +12,7 @@ from colony_findings import Results as StudyResults
 from paper.baselines import Baseline
 from paper.claims import Audit, assess
 from paper.comparison import DYNA_P5, Comparison
-from paper.figures import for_page
+from paper.figures import draw_all
 from paper.page import Seen, comparison_page
 from paper.table2 import Line, summarise, table2
 from synthetic_colony_study import build as build_study
@@ -57,7 +57,7 @@ def comparison_html() -> str:
     return comparison_page(
         *(comparison, BASELINES, lines, audit),
         Seen(
-            for_page(comparison, BASELINES),
+            drawings(draw_all(comparison, BASELINES)),
             [Player(f"Delivers {n}", "As it <should>", recording) for n in (1, 2)],
             sheet,
         ),

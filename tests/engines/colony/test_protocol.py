@@ -238,7 +238,6 @@ WRONG = [
     (lambda: At(3, task="following"), "`at.task` is 'following'; it must be a table of settings"),
     (lambda: Every(5, stop=2, trail=0), "`every.stop` is 2, before the first event"),
     (lambda: When("living", trail=0), "`when` needs a bound"),
-    (lambda: When("synchrony", above=1, trail=0), "needs the series of 'activity'"),
     (lambda: from_dict({"explode": 1}), "the name of an intervention is 'explode'"),
     (lambda: At(3, trail="gate"), "`at.trail` is 'gate'; it must be a level, which is a whole"),
     (lambda: At(3, trail=2.5), "`at.trail` is 2.5; it must be a level"),

@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 from colonies import act, begun, cells_of, load
+from colony_limits import least_mean_cycle, limits_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_worlds import random_world
 
 from taichi_ants import worlds
-from taichi_ants.analysis.bounds.limits import least_mean_cycle, limits_of
 from taichi_ants.task import Task, foraging, queueing
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.worlds import World
@@ -22,7 +22,7 @@ STEPS = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
 
 
 def test_the_papers_world() -> None:
-    limits = limits_of(worlds.paper())
+    limits = limits_of(worlds.paper(), Task())
     # There and back are 16 moves each, the food is picked up, and given.
     assert limits.cycle == 36
     # The queen stands in a corner, with three neighbours that serve once in three ticks.
@@ -38,12 +38,12 @@ def corridor(length: int) -> World:
 
 
 def test_a_corridor_by_hand() -> None:
-    limits = limits_of(corridor(3))
+    limits = limits_of(corridor(3), Task())
     # Beside both: pick up (which turns it round), give, turn by a sixth against the wall.
     assert limits.cycle == 3
     assert limits.queen == 1000 / 3
     assert limits.deliveries(5) == pytest.approx(1000 / 3)
-    long = limits_of(corridor(7))
+    long = limits_of(corridor(7), Task())
     # Four moves each way and a pick-up, which turns it round, and a give, which does not: two more
     # blocked moves until the way back comes into view at its side.
     assert long.cycle == 4 + 1 + 4 + 1 + 2

@@ -16,49 +16,33 @@ Both hold in the long run, for ants that neither die nor are born, and food that
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from taichi_ants import Task, World
 from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
-from taichi_ants.arguments import checked_task, checked_world
-from taichi_ants.features.support import BASE, CASTES, FOODS
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.worlds.world import World
-
-SUPPORTS = (
-    BASE - CASTES - FOODS - {"nests", "life.births", "life.lifespan", "life.pile_move_interval"}
-)
 
 
-@dataclass(frozen=True)
-class Limits:
-    """The bounds of one world.
+class Limits(NamedTuple):
+    """The bounds of one world."""
 
-    Attributes:
-        cycle: The fewest ticks between two deliveries of an ant; inf if it cannot deliver.
-        queen: The most deliveries per 1000 ticks that the cells around the queen allow.
-    """
-
-    cycle: float
-    queen: float
+    cycle: float  # the fewest ticks between two deliveries of an ant; inf if it cannot deliver
+    queen: float  # the most deliveries per 1000 ticks that the cells around the queen allow
 
     def deliveries(self, ants: int) -> float:
         """Return the most that this number of ants can deliver per 1000 ticks in the long run."""
         return min(ants * 1000 / self.cycle, self.queen)
 
 
-def limits_of(world: World, task: Task | None = None) -> Limits:
-    """Return the bounds of a world with the traffic rules of a task; None is the paper's."""
-    what = "a bound on deliveries"
-    task = checked_task(task, what, SUPPORTS)
-    checked_world(world, False, what, SUPPORTS)
+def limits_of(world: World, task: Task) -> Limits:
+    """Return the bounds of a world with the traffic rules of a task."""
     around = world.grid.index(world.queen) + world.grid.offsets
-    cells = world.walkable(around)[around]
+    cells = int(world.walkable(around)[around].sum())
     ticks = 2 if task.traffic.shared or task.turns_at_queen else 3
-    return Limits(shortest_cycle(world, task), 1000 * int(cells.sum()) / ticks)
+    return Limits(shortest_cycle(world, task), 1000 * cells / ticks)
 
 
 def shortest_cycle(world: World, task: Task) -> float:
