@@ -103,7 +103,7 @@ MUTATIONS = [
         "FOODS[0 * snapshot.ant_foods]",
         RASTER,
     ),
-    ("engines/colony/state.py", '{"nest": self.n_nests, "caste"', '{"caste"', NESTS),
+    ("engines/colony/state.py", "n > 1 and per != ANT", "per not in (ANT, NEST)", NESTS),
     ("engines/colony/state.py", "np.where(carries, self.kinds", "np.where(carries, 0", NESTS),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),

@@ -97,7 +97,7 @@ class Colony(TickingColony):
             recorder.begin(episode)
             with timetable:
                 for stop in stops(ticks, recorder.every):
-                    for _ in timetable.pieces(self._stepper.pieces, stop - self.ticks):
+                    for _ in timetable.pieces(TickingColony.pieces, stop - self.ticks):
                         if progress is not None:
                             progress((episode + self.ticks / ticks) / episodes)
                         if not self.running.any():

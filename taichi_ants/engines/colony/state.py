@@ -237,9 +237,9 @@ class ColonyState:
     @property
     def _axes(self) -> dict[str, int]:
         """The numbers of slots that own tables, or else of nests and castes if several do."""
-        axes = {"nest": self.n_nests, "caste": self.model.n_castes}
-        several = {name: n for name, n in axes.items() if n > 1}
-        return {"slot": self.capacity} if self.one_a_slot else several
+        if self.one_a_slot:
+            return {"slot": self.capacity}
+        return {per: n for per, n in self.sizes.items() if n > 1 and per != ANT}
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -451,14 +451,12 @@ class ColonyState:
         """Set the arrays with which worlds and ants begin each episode, see `set_to_start`."""
         self.n_food_sources = n_food_sources
         worlds, n, model = self.worlds, self.ants, self.model
-        starts = list(map(lambda w, seed: w.start(seed, n, self.start), worlds, self.seeds))
+        starts = [w.start(seed, n, self.start) for w, seed in zip(worlds, self.seeds, strict=True)]
         cells = np.stack([cells for cells, _ in starts])
         self.nests_at_start = nests = self._of_each(lambda world: world.nests_of(n))
         # Columns of the ants by world and number.
         headings = np.array([headings for _, headings in starts], np.int8)
-        self.first = {"cell": cells, "heading": headings}
-        if model.n_nests > 1:
-            self.first["nest"] = nests.astype(np.int8)
+        self.first = {"cell": cells, "heading": headings, "nest": nests.astype(np.int8)}
         for feature in model.features:
             self.first |= feature.columns(self)
         ground, kinds = self._of_each(World.ground), self._of_each(World.kinds_by_cell)

@@ -67,13 +67,5 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
     return Named(read)
 
 
-@for_kernels
-def ant_view(c: Any, v: Any, w: Any, ant: Any) -> Named:
-    """Return the view of an ant."""
-    return _view(c, v, w, ant=ant)
-
-
-@for_kernels
-def nest_view(c: Any, v: Any, w: Any, nest: Any) -> Named:
-    """Return the view of a nest."""
-    return _view(c, v, w, nest=nest)
+ant_view = for_kernels(lambda c, v, w, ant: _view(c, v, w, ant=ant))
+nest_view = for_kernels(lambda c, v, w, nest: _view(c, v, w, nest=nest))
