@@ -10,15 +10,13 @@ from taichi_ants.errors import AntsError, count
 from taichi_ants.features.feature import ANT, CASTE, Array, Feature, State, Task
 from taichi_ants.features.labour import Threshold
 from taichi_ants.features.life import Ticks
+from taichi_ants.grid.constants import MAX_CASTES, MAX_NESTS, TRAIL
 from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
     import numpy as np
 
-TRAIL = "trail"
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
-MAX_CASTES = 16
-MAX_NESTS = 7  # the number of a nest is in three bits of an ant's mark, of which 0 is no ant
 Rate = Annotated[float | None, Setting(least=0, most=1)]
 Number = Annotated[int | None, Setting(least=0)]
 Temperature = Annotated[float | None, Setting(least=1e-6, most=1e6)]

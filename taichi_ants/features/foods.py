@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from taichi_ants.features.feature import Feature, Task
 from taichi_ants.features.life import Ticks
+from taichi_ants.grid.constants import MAX_FOOD_KINDS, MOST_REWARD
 from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
     import numpy as np
 
-MAX_FOOD_KINDS, MAX_LOADS = 8, 1_000_000
-MOST_REWARD = 1000  # the largest absolute reward of an event
 Reward = Annotated[int, Setting(least=-MOST_REWARD, most=MOST_REWARD)]
 
 
@@ -36,7 +35,7 @@ class Food(Settings, path="task.foods.NAME"):
 
     pick_up: Annotated[Reward, Setting("reward for picking up this food")] = 3
     deliver: Annotated[Reward, Setting("reward for giving this food to the queen")] = 10
-    loads: Annotated[int, Setting("loads in a cell", least=1, most=MAX_LOADS)] = 1
+    loads: Annotated[int, Setting("loads in a cell", least=1, most=1_000_000)] = 1
     regrowth: Annotated[
         Ticks, Setting("time until an empty cell has all its loads again", least=0)
     ] = None

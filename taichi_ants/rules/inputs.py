@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from taichi_ants.features import INPUTS
 from taichi_ants.features.feature import Input
-from taichi_ants.features.foods import MOST_REWARD
+from taichi_ants.grid.constants import MOST_REWARD
 
 if TYPE_CHECKING:
     import numpy as np

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from taichi_ants.features.castes import MAX_CASTES as MAX_CASTES
-from taichi_ants.features.castes import MAX_NESTS as MAX_NESTS
-from taichi_ants.features.foods import MAX_FOOD_KINDS as MAX_FOOD_KINDS
-from taichi_ants.features.foods import MOST_REWARD as MOST_REWARD
+from taichi_ants.grid.constants import MAX_CASTES as MAX_CASTES
+from taichi_ants.grid.constants import MAX_FOOD_KINDS as MAX_FOOD_KINDS
+from taichi_ants.grid.constants import MAX_NESTS as MAX_NESTS
 from taichi_ants.grid.constants import MAX_STEPS as MAX_STEPS
+from taichi_ants.grid.constants import MOST_REWARD as MOST_REWARD
 
 # Codes of the cells in view (two bits each in a state index).
 SEES_EMPTY = 0  # E
