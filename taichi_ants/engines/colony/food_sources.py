@@ -80,25 +80,20 @@ def changed(
     A waiting source of a cell gets its food back. A new source joins the pile of the first adjacent
     source, or forms a new pile. The source of the food takes its kind. `offsets` are the grid's.
     """
-    if what != FOOD:
-        sources = sources[:, ~np.isin(sources[0], cells)]
-    at, taken, pile, kinds = sources.tolist()
+    gone = () if what == FOOD else cells
+    rows = sources[:, ~np.isin(sources[0], gone)].T.tolist()  # cell, taken, pile, kind
     on: dict[int, list[int]] = {}
-    for source, cell in enumerate(at):
+    for source, (cell, *_) in enumerate(rows):
         on.setdefault(cell, []).append(source)
     for cell in cells.tolist() if what == FOOD else ():
         here = on.setdefault(cell, [])
         if not here:
-            around = [on.get(cell + step, ()) for step in offsets.tolist()]
-            first = min((source for there in around for source in there), default=None)
-            here.append(len(at))
-            at.append(cell)
-            taken.append(0)
-            kinds.append(kind)
-            pile.append(max(pile, default=-1) + 1 if first is None else pile[first])
-        if all(taken[source] >= 0 for source in here):
-            taken[here[0]] = -1
-        (full,) = [source for source in here if taken[source] < 0]
-        kinds[full] = kind
-    _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without removed piles
-    return np.array([at, taken, pile, kinds], int).reshape(4, -1)
+            around = [source for step in offsets.tolist() for source in on.get(cell + step, ())]
+            new_pile = max((pile for _, _, pile, _ in rows), default=-1) + 1
+            here.append(len(rows))
+            rows.append([cell, 0, rows[min(around)][2] if around else new_pile, kind])
+        (full,) = [source for source in here if rows[source][1] < 0] or here[:1]
+        rows[full][1], rows[full][3] = -1, kind
+    now = np.array(rows, int).reshape(-1, 4).T
+    _, now[2] = np.unique(now[2], return_inverse=True)  # without removed piles
+    return now
