@@ -19,6 +19,7 @@ LAYERS = (
     {"errors", "process_variables", "subnormals"},
     {"files", "grid", "registry", "settings"},
     {"arithmetic"},
+    {"kernel_functions"},
     {"features"},
     {"rules"},
     {"task"},
@@ -38,8 +39,8 @@ LAYERS = (
 )
 # Kernels live in these; runtime starts Taichi.
 PARTS_WITH_TAICHI = {
-    *("arithmetic", "features", "task", "learners", "engines", "rendering", "offline", "envs"),
-    "runtime",
+    *("arithmetic", "kernel_functions", "task", "learners", "engines", "rendering", "offline"),
+    *("envs", "runtime"),
 }
 
 FOLDERS = ("taichi_ants", "experiments", "examples")

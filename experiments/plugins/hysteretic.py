@@ -7,14 +7,12 @@ have caused a bad outcome. To compare it with Q-learning:
         --learners q_learning hysteretic --out results/hysteretic
 """
 
-import taichi as ti
-
+from taichi_ants.kernel_functions import ti
 from taichi_ants.learners import register, td_learner
 
 PATIENCE = 0.2  # factor on negative TD errors
 
 
-@ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
     """Return the TD error of Q-learning, reduced if it is negative."""
     error = reward + discount * next_values.max() - value

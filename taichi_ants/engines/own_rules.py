@@ -15,22 +15,9 @@ from taichi.lang.impl import subscript
 from taichi_ants import runtime
 from taichi_ants.arithmetic.numbers import exponential, logarithm, power
 from taichi_ants.engines.launch import last_line
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.rules.inputs import KINDS, values_shown
 from taichi_ants.rules.rule import TRIES, Rule, tries
-
-
-class Named:
-    """An object with attributes that a function returns by name, while a kernel compiles."""
-
-    _data_oriented = True  # Taichi requires it of objects whose attributes kernels read
-
-    def __init__(self, read: Callable[[str], Any]) -> None:
-        self._read = read
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # of Python
-            raise AttributeError(name)
-        return self._read(name)
 
 
 @ti.func
@@ -107,14 +94,7 @@ def bounded_function(rule: Rule) -> Callable[..., Any]:
         inside = ti.select(inside < ti.f64(most), inside, ti.f64(most))
         return ti.cast(ti.floor(inside), ti.i32) if ti.static(is_whole) else inside
 
-    return for_kernels(lambda *arguments: bounded(function(*arguments)))
-
-
-def for_kernels(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a Python function that kernels call while they compile."""
-    # Taichi requires this attribute, with any value.
-    function._is_taichi_function = False
-    return function
+    return while_compiling(lambda *arguments: bounded(function(*arguments)))
 
 
 def difference(rule: Rule, n: int = TRIES) -> str:
@@ -144,7 +124,7 @@ def _results(rule: Rule, drawn: list[dict[str, Any]]) -> np.ndarray:
     results = np.zeros(len(rows))
     rows_type, results_type = (ti.types.ndarray(ti.f64, ndim) for ndim in (2, 1))
 
-    @for_kernels
+    @while_compiling
     def of_row(inputs: Any, row: Any) -> Any:
         arguments, at = [], 0
         for length in lengths:

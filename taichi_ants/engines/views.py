@@ -6,6 +6,7 @@ from typing import Any
 
 import taichi as ti
 
+from taichi_ants.kernel_functions import kernel_function
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.vision import see_by_level, see_carrying, see_foraging, state_index
@@ -66,4 +67,4 @@ def fill_codes(
 @cache
 def encode_function(observation: Observation) -> Callable[..., Any]:
     """Return an observation's `encode` for kernels."""
-    return ti.func(observation.encode)
+    return kernel_function(observation.encode)

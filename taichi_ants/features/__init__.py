@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 from taichi_ants.features.castes import CASTES
 from taichi_ants.features.castes import numbers_of_castes as numbers_of_castes
-from taichi_ants.features.feature import Array, Feature, KernelFunction, Task
+from taichi_ants.features.feature import Array, Feature, Task
 from taichi_ants.features.foods import FOODS
 from taichi_ants.features.labour import LABOUR
 from taichi_ants.features.life import AGE
 from taichi_ants.features.noise import MISREAD, SLIP
 from taichi_ants.features.points import POINTS
+from taichi_ants.kernel_functions import KernelFunction
 
 if TYPE_CHECKING:
     import numpy as np

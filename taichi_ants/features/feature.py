@@ -10,19 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
-from importlib import import_module
 from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from taichi_ants.features.points import POINTS
+from taichi_ants.kernel_functions import Function, KernelFunction
 from taichi_ants.settings import Settings
 
 if TYPE_CHECKING:
     import numpy as np
 
 ANT, NEST, CASTE = "ant", "nest", "caste"
-Function = Callable[..., Any]
 # Of `taichi_ants.task`, which imports the features.
 Task = Any
 Caste = Any
@@ -93,45 +91,6 @@ class Input(NamedTuple):
 
     meaning: str
     length: int = 0
-
-
-class KernelFunction:
-    """A plain function that becomes a Taichi function when a kernel first calls it.
-
-    So the files of features do not import Taichi, and commands start quickly.
-    """
-
-    _is_taichi_function = False  # Taichi requires this attribute, with any value
-
-    def __init__(self, body: Function) -> None:
-        self.body, self.__doc__ = body, body.__doc__
-
-    @cached_property
-    def _func(self) -> Function:
-        import taichi as ti
-
-        # Views of ants and nests, which are arguments of hooks, are no values of the kernel.
-        views = {"a", "nest"} & signature(self.body).parameters.keys()
-        self.body.__annotations__ = dict.fromkeys(views, ti.template())
-        return ti.func(self.body)
-
-    def __call__(self, *arguments: Any) -> Any:
-        return self._func(*arguments)
-
-
-class _Late:
-    """A module that is imported at its first use, when a kernel compiles."""
-
-    def __init__(self, load: Callable[[], Any]) -> None:
-        self._load = load
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._load(), name)
-
-
-ti: Any = _Late(lambda: import_module("taichi"))
-bits: Any = _Late(lambda: import_module("taichi_ants.arithmetic.random_bits"))
-numbers: Any = _Late(lambda: import_module("taichi_ants.arithmetic.numbers"))
 
 
 @dataclass(eq=False, frozen=True, repr=False)

@@ -26,19 +26,9 @@ from numbers import Real
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from taichi_ants.errors import is_flag
-from taichi_ants.features.feature import (
-    ANT,
-    NEST,
-    Array,
-    Feature,
-    Mark,
-    Measured,
-    Task,
-    bits,
-    numbers,
-    ti,
-)
+from taichi_ants.features.feature import ANT, NEST, Array, Feature, Mark, Measured, Task
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_TRAIT
+from taichi_ants.kernel_functions import bits, numbers, ti
 from taichi_ants.settings import Setting, Settings
 
 LabourRule = Literal["none", "thresholds"]

@@ -8,8 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from taichi_ants.features.feature import ANT, Array, Feature, ti
+from taichi_ants.features.feature import ANT, Array, Feature
 from taichi_ants.grid.constants import MAX_STEPS
+from taichi_ants.kernel_functions import ti
 from taichi_ants.settings import Setting, Settings
 
 Ticks = Annotated[int | None, Setting(unit="ticks", least=1, most=MAX_STEPS)]

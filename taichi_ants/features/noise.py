@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from taichi_ants.features.feature import Feature, bits, ti
+from taichi_ants.features.feature import Feature
+from taichi_ants.kernel_functions import bits, ti
 from taichi_ants.settings import Setting, Settings, Share
 
 _ACTIONS, _OTHER_CODES = 5, 3

@@ -1,15 +1,13 @@
 """Double Q-learning (van Hasselt 2010): one table selects the best action, the other rates it."""
 
-import taichi as ti
-
 from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word
+from taichi_ants.kernel_functions import ti
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.memory import discount_of, values_of
 from taichi_ants.task.constants import N_ACTIONS, ROW
 
 
-@ti.func
-def learn(memory: ti.template(), at, step, rates, random_state):
+def learn(memory, at, step, rates, random_state):
     """Update table A or B, drawn at random; the ant acts by their mean."""
     rng = advance(random_state)
     drawn = below(high_word(bits_of(rng)), 2)

@@ -1,24 +1,22 @@
 """Dyna-Q (Sutton 1990): Q-learning with additional updates from a model of the world."""
 
-import taichi as ti
-
 from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word
+from taichi_ants.kernel_functions import kernel_function
 from taichi_ants.learners import model
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.q_learning import td_error
 from taichi_ants.task.constants import ROW
 
 
-@ti.func
-def update(memory: ti.template(), at, rates, pair, transition):
+@kernel_function
+def update(memory, at, rates, pair, transition):
     """Update a pair and return its TD error."""
     error = model.error_of(memory, at, rates, pair, transition)
     memory.q[at.table + pair] = memory.q[at.table + pair] + rates.learning_rate * error
     return error
 
 
-@ti.func
-def learn(memory: ti.template(), at, step, rates, random_state):
+def learn(memory, at, step, rates, random_state):
     """Update from the step, then from random pairs of the model."""
     pair = step.state * ROW + step.action
     transition = model.pack_transition(step.next_state, step.reward, step.terminated)

@@ -1,12 +1,10 @@
 """Expected SARSA (van Seijen et al. 2009): bootstraps from the mean over the policy's actions."""
 
-import taichi as ti
-
+from taichi_ants.kernel_functions import ti
 from taichi_ants.learners.learner import td_learner
 from taichi_ants.task.rules.policy import best_value
 
 
-@ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
     """Return reward + discount * E Q(s', a') - Q(s, a) under the epsilon-greedy policy."""
     best = best_value(next_values)

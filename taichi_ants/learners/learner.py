@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from taichi_ants.errors import checked_whole
+from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.kernel_functions import kernel_function
 from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 
 
@@ -33,10 +34,10 @@ class Learner:
 
     Attributes:
         name: The name that configurations use.
-        learn: A `ti.func` (memory, at, step, rates, random_state) -> (TD error f32, random_state
-            u64), called after each step; see `taichi_ants.learners.memory` for the arguments, of
-            which `memory` is a `ti.template()`. It changes the memory of one run, at `at`.
-        begin: A `ti.func` (memory, at), called at the start of each episode, or None.
+        learn: A function (memory, at, step, rates, random_state) -> (TD error f32, random_state
+            u64), called after each step; see `taichi_ants.learners.memory` for the arguments. It
+            changes the memory of one run, at `at`. Kernels compile it, and those below.
+        begin: A function (memory, at), called at the start of each episode, or None.
         td_error: The TD error if ants can share a table, else None; see `td_learner`.
         draws_next_action: Whether the next action is drawn before the update and then taken
             (on-policy learners). Otherwise a step has no next action.
@@ -60,6 +61,16 @@ class Learner:
     memory: Callable[[Any, int], Memory] = lambda settings, n_states: Memory()
     cost: Callable[[Any], float] = lambda settings: 1.0
     summary: str = ""
+
+    def __post_init__(self) -> None:
+        for part in ("learn", "begin", "td_error"):
+            function = getattr(self, part)
+            if function is not None:
+                if not callable(function):
+                    raise AntsError(
+                        f"{part} of {self.name!r} is {shown(function)}; it must be a function."
+                    )
+                object.__setattr__(self, part, kernel_function(function))
 
     def settings(self, config: TrainingConfig) -> Hyperparameters:
         """Return the hyperparameters of a configuration."""
@@ -85,7 +96,7 @@ def td_learner(
 
     Args:
         name, draws_next_action, summary: See `Learner`.
-        td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> float.
+        td_error: A function (value, reward, discount, next_values, next_action, epsilon) -> float.
             `value` is that of the state-action pair to update; `discount` is 0 if the step
             terminated; `next_values` is the vector of the five action values of the next state.
             `next_action` is i32, all others are f32; it is 0 if the step terminated, and allowed
@@ -93,4 +104,5 @@ def td_learner(
     """
     from taichi_ants.learners.memory import learn_by  # here, because it imports Taichi
 
-    return Learner(name, learn_by(td_error), None, td_error, draws_next_action, summary=summary)
+    error = kernel_function(td_error)
+    return Learner(name, learn_by(error), None, error, draws_next_action, summary=summary)

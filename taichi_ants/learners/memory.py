@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import taichi as ti
 from taichi.lang.expr import Expr
 
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.settings import declared
 from taichi_ants.task.constants import N_ACTIONS, ROW
@@ -111,13 +112,10 @@ def learn_by(td_error: Any) -> Callable[..., object]:
     return learn
 
 
+@while_compiling
 def _as_f32(result: Any) -> object:
     """Return the result of a TD error as f32; called while a kernel compiles."""
     if isinstance(result, Expr) and result.is_tensor():  # which would end the process
         what = "a vector where one float is needed (the largest of them is next_values.max())"
         raise ti.TaichiCompilationError(f"it returns {what}")
     return ti.cast(result, ti.f32)
-
-
-# Taichi requires this attribute, with any value, of Python functions that kernels call.
-_as_f32._is_taichi_function = False

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-import taichi as ti
-
+from taichi_ants.kernel_functions import ti
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.memory import discount_of
@@ -21,15 +20,13 @@ class Steps(Hyperparameters):
     ] = 4
 
 
-@ti.func
-def begin(memory: ti.template(), at):
+def begin(memory, at):
     """Remove the pairs that wait for an update."""
     memory.integers[at.integers] = 0
     memory.integers[at.integers + 1] = 0
 
 
-@ti.func
-def learn(memory: ti.template(), at, step, rates, random_state):
+def learn(memory, at, step, rates, random_state):
     """Update the pair of n steps ago; at the end of an episode, update all pairs that wait.
 
     The integers are the number of pairs that wait and the index of the oldest, then a ring buffer

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-import taichi as ti
-
+from taichi_ants.kernel_functions import kernel_function, ti
 from taichi_ants.learners import model
 from taichi_ants.learners.learner import Learner
 from taichi_ants.settings import Setting
@@ -23,8 +22,8 @@ class Sweeping(model.Planning):
     ] = 0.0001
 
 
-@ti.func
-def most_urgent(memory: ti.template(), at):
+@kernel_function
+def most_urgent(memory, at):
     """Return the (lowest) slot of the model with the largest priority, and the priority."""
     first, largest = 0, memory.floats[at.floats]
     for slot in range(1, model.visited(memory, at)):
@@ -34,8 +33,7 @@ def most_urgent(memory: ti.template(), at):
     return first, largest
 
 
-@ti.func
-def learn(memory: ti.template(), at, step, rates, random_state):
+def learn(memory, at, step, rates, random_state):
     """Store the error of the pair as its priority, then update the pairs of highest priority.
 
     The integers are the model, and the floats are the priority of each of its slots.

@@ -1,12 +1,9 @@
 """Q-learning (Watkins 1989): off-policy, bootstraps from the best next action."""
 
-import taichi as ti
-
 from taichi_ants.learners.learner import td_learner
 from taichi_ants.task.rules.policy import best_value
 
 
-@ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
     """Return reward + discount * max Q(s', .) - Q(s, a)."""
     return reward + discount * best_value(next_values) - value

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from importlib import import_module
 
-from taichi_ants.errors import AntsError, expect, shown, unusable
+from taichi_ants.errors import AntsError, expect, unusable
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.registry import Registry
@@ -46,13 +46,6 @@ def register(learner: Learner) -> Learner:
     """
     expect("learner", learner, Learner)
     name = learner.name
-    functions = {"learn": learner.learn, "begin": learner.begin, "td_error": learner.td_error}
-    for part, function in functions.items():
-        # Taichi's own attribute; it would compile a plain function without its branches and loops.
-        if function is not None and not getattr(function, "_is_taichi_function", False):
-            raise AntsError(
-                f"{part} of {shown(name)} is not a Taichi function; decorate it with @ti.func."
-            )
     try:  # finds errors early
         settings = learner.hyperparameters()
         expect("the result of memory", learner.memory(settings, 128), Memory)

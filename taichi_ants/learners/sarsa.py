@@ -1,11 +1,8 @@
 """SARSA (Rummery and Niranjan 1994): on-policy, bootstraps from the next action."""
 
-import taichi as ti
-
 from taichi_ants.learners.learner import td_learner
 
 
-@ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
     """Return reward + discount * Q(s', a') - Q(s, a); the discount is 0 if no a' was drawn."""
     return reward + discount * next_values[next_action] - value

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-import taichi as ti
-
+from taichi_ants.kernel_functions import ti
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.memory import discount_of
@@ -25,14 +24,12 @@ class Traces(Hyperparameters):
     ] = 32
 
 
-@ti.func
-def begin(memory: ti.template(), at):
+def begin(memory, at):
     """Remove all traces."""
     memory.integers[at.integers] = 0
 
 
-@ti.func
-def learn(memory: ti.template(), at, step, rates, random_state):
+def learn(memory, at, step, rates, random_state):
     """Update this pair and those before it, in proportion to their traces.
 
     The integers are the number of traces, then their pairs from the newest to the oldest.

@@ -54,17 +54,14 @@ def in_a_colony(name="mine", sharing="shared"):
 ONE_ENGINE = (in_runs, pytest.param(in_a_colony, marks=pytest.mark.slow))
 
 
-@ti.func
 def natural_q_learning(value, reward, discount, next_values, next_action, epsilon):
     return reward + discount * next_values.max() - value
 
 
-@ti.func
 def natural_sarsa(value, reward, discount, next_values, next_action, epsilon):
     return reward + discount * next_values[next_action] - value
 
 
-@ti.func
 def natural_expected_sarsa(value, reward, discount, next_values, next_action, epsilon):
     mean = next_values.sum() * ti.f32(1 / len(next_values))
     best = next_values.max()
@@ -105,27 +102,22 @@ def test_a_learner_of_ones_own_is_replaced():
     assert registry.names().count("mine") == 1
 
 
-@ti.func
 def of_reward(value, reward, discount, next_values, next_action, epsilon):
     return reward - value
 
 
-@ti.func
 def of_a_vector(value, reward, discount, next_values, next_action, epsilon):
     return reward + discount * next_values - value
 
 
-@ti.func
 def of_nothing(value, reward, discount, next_values, next_action, epsilon):
     reward + value
 
 
-@ti.func
 def of_an_action_too_far(value, reward, discount, next_values, next_action, epsilon):
     return next_values[next_action + 1]
 
 
-@ti.func
 def of_a_large_next_value(value, reward, discount, next_values, next_action, epsilon):
     return reward + next_values[max(0, int(next_values.max() * 0.001))] - value
 
@@ -135,7 +127,6 @@ def of_itself(value, reward, discount, next_values, next_action, epsilon):
     return of_itself(value, reward, discount, next_values, 0, epsilon)
 
 
-@ti.func
 def of_a_lost_name(value, reward, discount, next_values, next_action, epsilon):
     return lost  # noqa: F821
 
@@ -162,22 +153,16 @@ def test_what_taichi_cannot_compile_is_named_and_taichi_goes_on(td_error, says, 
     assert in_runs("q_learning").any()
 
 
-def plain(memory, at, step, rates, random_state):
-    return 0.0, random_state
-
-
 @dataclass(frozen=True)
 class Momentum(Hyperparameters):
     momentum: Annotated[float, Setting("share of the last error", least=0, most=1)] = 0.5
 
 
-@ti.func
-def begin(memory: ti.template(), at):
+def begin(memory, at):
     memory.floats[at.floats] = 0.0
 
 
-@ti.func
-def learn(memory: ti.template(), at, step, rates, random_state):
+def learn(memory, at, step, rates, random_state):
     """SARSA by a TD error that is mixed with the one before, in this episode."""
     pair = step.state * 8 + step.action
     discount = rates.discount if step.terminated == 0 else ti.f32(0.0)
@@ -218,20 +203,17 @@ def test_a_memory_lives_through_a_run_and_belongs_to_it():
     assert not np.array_equal(result.q_values[0], sarsa.q_values[0])
 
 
-@ti.func
-def that_forgets_at(memory: ti.template(), at, step, rates, random_state):
+def that_forgets_at(memory, at, step, rates, random_state):
     memory.q[step.state * 8 + step.action] += rates.learning_rate
     return ti.f32(1.0), random_state
 
 
-@ti.func
-def beyond_its_memory(memory: ti.template(), at, step, rates, random_state):
+def beyond_its_memory(memory, at, step, rates, random_state):
     memory.integers[at.integers + 1] += 1
     return ti.f32(1.0), random_state
 
 
-@ti.func
-def of_one_value(memory: ti.template(), at, step, rates, random_state):
+def of_one_value(memory, at, step, rates, random_state):
     return ti.f32(1.0)
 
 
@@ -246,7 +228,7 @@ register(td_learner("undrawn", mine.natural_sarsa))
 register(td_learner("too_far", mine.of_an_action_too_far, draws_next_action=True))
 register(td_learner("large", mine.of_a_large_next_value))
 for learn in (mine.that_forgets_at, mine.beyond_its_memory, mine.of_one_value):
-    register(replace(mine.with_memory(), name=learn.func.func.__name__, learn=learn))
+    register(replace(mine.with_memory(), name=learn.__name__, learn=learn))
 """
 
 
@@ -294,7 +276,7 @@ FAILS = "learner 'mine' cannot be used: "
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"learn": plain}, "learn of 'mine' is not a Taichi function; decorate it with @ti.func."),
+        ({"learn": 5}, "learn of 'mine' is 5; it must be a function."),
         ({"hyperparameters": Clashing}, "'discount' is a setting of all learners"),
         ({"hyperparameters": OfText}, f"{FAILS}the field kind has the type "),
         ({"hyperparameters": OutOfRange}, f"{FAILS}`training.depth` is 3; it must be"),
@@ -327,7 +309,6 @@ def test_the_examples_memory_makes_the_difference(tmp_path):
     assert not np.array_equal(result.q_values[1], plain.q_values[0])
 
 
-@ti.func
 def of_a_logarithm(value, reward, discount, next_values, next_action, epsilon):
     return reward - ti.log(value - 0.5)
 

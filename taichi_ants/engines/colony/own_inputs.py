@@ -26,8 +26,9 @@ from taichi_ants.engines.colony.steps import (
 )
 from taichi_ants.engines.colony.trail import level_of
 from taichi_ants.engines.colony.views import ant_view
-from taichi_ants.engines.own_rules import bounded_function, for_kernels
+from taichi_ants.engines.own_rules import bounded_function
 from taichi_ants.features import INPUTS
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.memory import values_of
 from taichi_ants.rules import Rule
 from taichi_ants.rules.inputs import AHEAD, LEVELS, field_of
@@ -50,7 +51,7 @@ class OwnRule:
         self.inputs, self.function = tuple(rule.inputs), bounded_function(rule)
         self.places = range(first, first + len(rule.parameters))
 
-    @for_kernels
+    @while_compiling
     def choose(self, c, v, cues, w, ant, state, paper_state, tick, bits):
         """Return an action, i32; see `steps.draw_by_cues`."""
         carries, seen = trait(c.carries, ant), state if v.is_papers else paper_state
@@ -69,7 +70,7 @@ class OwnRule:
         }
         return self.result(c, make | _of_levels(self.inputs, *sight, carries, tick))
 
-    @for_kernels
+    @while_compiling
     def lay(self, c, v, w, ant, level, index, carried, carries, event, paper_state, tick):
         """Return a level, f64; see `trail.deposit`."""
         make: Make = {name: partial(_level, c, v, name, index, tick) for name in self.inputs}
@@ -83,12 +84,12 @@ class OwnRule:
         }
         return self.result(c, make)
 
-    @for_kernels
+    @while_compiling
     def evaporate(self, c, level, tick):
         """Return a level, f64; see `trail.evaporate`."""
         return self.result(c, {"level": lambda: level, "tick": lambda: tick})
 
-    @for_kernels
+    @while_compiling
     def pay(self, c, v, cues, w, ant, next_paper_state, tick):
         """Return a reward, i32; see `steps.own_reward`."""
         carries, seen = trait(c.carries, ant), next_paper_state

@@ -44,6 +44,7 @@ from taichi_ants.engines.colony.trail import (
 from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.engines.views import fill_codes
 from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task.constants import (
     BEST_AT,
@@ -250,13 +251,10 @@ def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant,
     return view
 
 
+@while_compiling
 def set_entry(view: Any, name: str, level: Any) -> None:
     """Set the level of the ant's own cell in a view, while a kernel compiles."""
     getattr(view, f"own_{name}")._assign(level)
-
-
-# Taichi requires this attribute, with any value, of Python functions that kernels call.
-set_entry._is_taichi_function = False  # type: ignore[attr-defined]
 
 
 @ti.func

@@ -8,9 +8,9 @@ from taichi.lang.impl import subscript
 
 from taichi_ants.engines.colony import columns
 from taichi_ants.engines.colony.layout import COLUMNS, NestRow, WorldRow
-from taichi_ants.engines.own_rules import Named, for_kernels
 from taichi_ants.features import numbers_of_castes
 from taichi_ants.features.feature import ANT, CASTE, NEST
+from taichi_ants.kernel_functions import Named, while_compiling
 from taichi_ants.task.model import Model
 
 WORLD = "world"
@@ -67,5 +67,5 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
     return Named(read)
 
 
-ant_view = for_kernels(lambda c, v, w, ant: _view(c, v, w, ant=ant))
-nest_view = for_kernels(lambda c, v, w, nest: _view(c, v, w, nest=nest))
+ant_view = while_compiling(lambda c, v, w, ant: _view(c, v, w, ant=ant))
+nest_view = while_compiling(lambda c, v, w, nest: _view(c, v, w, nest=nest))

@@ -8,11 +8,11 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import draw_below
-from taichi_ants.engines.own_rules import Named, for_kernels
 from taichi_ants.engines.views import encode_function, fill_codes, view_type
 from taichi_ants.features import hooks_at, used_by
 from taichi_ants.features.feature import Feature
 from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.kernel_functions import Named, while_compiling
 from taichi_ants.task import Task
 from taichi_ants.task.constants import FOOD, FORWARD, LEFT, PICK_UP, QUEEN, RIGHT
 from taichi_ants.task.events import Event, Reason
@@ -65,7 +65,7 @@ class Rules(NamedTuple):
         return cls(task.sees, deposit, half, used_by(task), softly)
 
 
-@for_kernels
+@while_compiling
 def ant_view(a: Any, ant: Any) -> Named:
     """Return the view of a lone ant, through which hooks of features read it by name.
 

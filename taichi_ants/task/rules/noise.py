@@ -4,6 +4,7 @@ from typing import Any
 
 import taichi as ti
 
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.task.rules.vision import code_in_view, state_index
 
 
@@ -25,13 +26,10 @@ def misread_paper_state(paper_state, random_state, hooks: ti.template(), ant: ti
     return state_index(paper_state >> 6, left, forward, right), last
 
 
+@while_compiling
 def entry_of(view: Any, name: str) -> Any:
     """Return a vector of a view by its name, while a kernel compiles."""
     return getattr(view, name)
-
-
-# Taichi requires this attribute, with any value, of Python functions that kernels call.
-entry_of._is_taichi_function = False  # type: ignore[attr-defined]
 
 
 @ti.func
