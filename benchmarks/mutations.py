@@ -56,7 +56,6 @@ NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
 LONE_NOISE = "tests/envs/test_noise.py"
 DESIGN = "tests/studies/test_design.py"
-SENSITIVITY = "tests/analysis/test_sensitivity.py"
 FEATURES = "tests/test_features.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
@@ -93,7 +92,7 @@ MUTATIONS = [
     ("rendering/rasteriser.py", "ANTS[snapshot.ant_nests]", "ANTS[0 * snapshot.ant_nests]", RASTER),
     (
         "viewer/recorder.py",
-        "self.colony.tables_of_ants[self.world, slots] *",
+        "self.colony.tables_of_ants[0, slots] *",
         "0 * slots *",
         RECORDING,
     ),
@@ -199,7 +198,6 @@ MUTATIONS = [
     ("engines/runs/step.py", "enters & ant.carries", "moves & ant.carries", BATCHED),
     ("task/rules/vision.py", "(state >> 1) & 21", "(state >> 1) & 5", BATCHED),
     ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", LONE_NOISE),
-    ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
     ("engines/runs/kernels.py", "= paper_state, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
     ("features/life.py", "a.age >= lifespan", "a.age > lifespan", COLONY),
@@ -270,7 +268,6 @@ MUTATIONS = [
     ("analysis/statistics.py", "np.sqrt(n / (n - 1))", "np.sqrt((n - 1) / n)", STATISTICS),
     ("analysis/statistics.py", "cubes / (6 *", "cubes / (3 *", STATISTICS),
     ("analysis/statistics.py", "levels * (last + 2) - 1", "levels * last", STATISTICS),
-    ("analysis/statistics.py", "- (n - 1) * statistic", "- n * statistic", STATISTICS),
     ("analysis/findings.py", "max(1, len(readings))", "max(1, len(contrasts))", FINDINGS),
     ("analysis/findings.py", "< self.low or low > self.high", "< self.low", FINDINGS),
     (
@@ -300,7 +297,7 @@ MUTATIONS = [
     ("studies/study.py", "chain(point)[0]", "chain(point)[-1]", STUDIES),
     ("studies/study.py", "needed & first.missing(store)", "needed & False", STUDIES),
     ("studies/study.py", "len(failed) == _HOPELESS and", "False and", EXECUTORS),
-    ("studies/points.py", " if setting != _default(each)}", "}", STUDIES),
+    ("studies/points.py", "if setting != (", "if True or (", STUDIES),
     ("studies/points.py", '"physics": PHYSICS, "kind"', '"kind"', STUDIES),
     ("studies/points.py", "= declared.checked(settings[declared.name])", "= 0.5", STUDIES),
     ("studies/executors.py", "if deaths[piece] < TRIES:", "if False:", EXECUTORS),
@@ -314,8 +311,8 @@ MUTATIONS = [
     # Recorder and viewer.
     ("viewer/recorder.py", "executed + 16 *", "executed + 8 *", RECORDING),
     ("viewer/recorder.py", "[order] + 8 * carrying", "[order] + 8 * ~carrying", RECORDING),
-    ("viewer/recorder.py", "*rates, *counts, *clocks)", "*rates, *counts, tick)", RECORDING),
-    ("viewer/recorder.py", "colony.delivered[self.world] + totals", "0 * totals", SESSION),
+    ("viewer/recorder.py", "*rates, *counts, *clocks)", "*rates, *counts, *[0] * 9)", RECORDING),
+    ("viewer/recorder.py", "colony.delivered[0] + totals", "0 * totals", SESSION),
     ("viewer/recorder.py", "        late._forget()\n", "", SESSION),
     ("viewer/recorder.py", "[new] = False", "[new] = True", RECORDING),
     (
@@ -354,7 +351,12 @@ MUTATIONS = [
         "2",
         "tests/worlds/test_world_validation.py",
     ),
-    ("worlds/world.py", "np.lexsort((words, distance))", "np.argsort(words)", "tests/worlds"),
+    (
+        "worlds/world.py",
+        "np.lexsort((words(cells), distance[near]))",
+        "words(cells).argsort()",
+        "tests/worlds",
+    ),
     ("worlds/world.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
     ("grid/hexgrid.py", "difference > -y", "difference >= -y", "tests/grid"),
     # Measures and results.
@@ -388,13 +390,12 @@ MUTATIONS = [
     ("features/support.py", ".intersection(supports):", ":", FEATURES),
     ("settings.py", "if value == setting.default:", "if True:", FEATURES),
     # Designs.
-    ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),
+    ("studies/design.py", "margin = 0.5 if axis.whole else 0.0", "margin = 0.0", DESIGN),
     ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
-    ("studies/design.py", "random_base2(whole)[: self.samples]", "random_base2(whole)", DESIGN),
-    ("studies/design.py", "if self.kind == LATIN_HYPERCUBE else {}", "if False else {}", DESIGN),
-    ("analysis/sensitivity.py", "- drawn.mean(axis=0)", "", SENSITIVITY),
-    ("analysis/sensitivity.py", "(seeds - 1)) / seeds", "(seeds - 1))", SENSITIVITY),
-    ("analysis/sensitivity.py", '"seed": RANDOM_SEED', '"seed": 0', SENSITIVITY),
+    ("studies/design.py", "random_base2(whole)[:n]", "random_base2(whole)", DESIGN),
+    ("studies/design.py", "- drawn.mean(axis=0)", "", DESIGN),
+    ("studies/design.py", "(seeds - 1)) / seeds", "(seeds - 1))", DESIGN),
+    ("studies/design.py", '"seed": RANDOM_SEED', '"seed": 0', DESIGN),
     # Archives of studies, and descriptions of models.
     ("studies/archive.py", "> MOST_BYTES:", "> 2 * MOST_BYTES:", ARCHIVE),
     ("commands/reproduce.py", "sum(map(bool, found", "0 * sum(map(bool, found", ARCHIVE),

@@ -60,9 +60,11 @@ def from_minari(
     if "taichi_ants" in metadata:
         facts = json.loads(metadata["taichi_ants"])
         known, form = Dataset.described(facts), facts["format"]
-    shown, pieces = Shown(known["task"].sees, form), []
+    shown, pieces = Shown(known["task"].sees, form).table, []
+    state_of = {row.tobytes(): state for state, row in enumerate(shown)}
     for number, episode in enumerate(source.iterate_episodes()):
-        states, n = shown.states(episode.observations), len(episode)
+        rows, n = episode.observations.astype(shown.dtype), len(episode)
+        states = np.array([state_of[row.tobytes()] for row in rows])
         usual = {"run": np.zeros(n), "agent": np.zeros(n), "step": np.arange(n)}
         usual["behaviour_probability"] = np.full(n, np.nan)
         truncated = np.array(episode.truncations) & ~episode.terminations

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_ants import Task, World
-from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
+from taichi_ants.analysis.bounds import Surroundings, look_around
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import EMPTY
 

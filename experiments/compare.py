@@ -33,8 +33,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     from taichi_ants import AntsError, Task, TrainingConfig, files, learners, train, worlds
     from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
-    from taichi_ants.engines.runs.engine import MAX_ROLLOUT_STEPS
-    from taichi_ants.engines.runs.training import evaluate, trace_policies
+    from taichi_ants.engines.runs.engine import MAX_ROLLOUT_STEPS, Runs
+    from taichi_ants.engines.runs.training import evaluate, followed
     from taichi_ants.files import archives
     from taichi_ants.learners.policies import save_policy
     from taichi_ants.measures.finished import LONE, Run, values_of
@@ -198,8 +198,9 @@ def what_policies_do(
     tables = q_values.reshape(-1, *q_values.shape[2:])
     max_steps = min(point.max_steps, MAX_ROLLOUT_STEPS)
     task, several = page.as_in_training(point.task), [*seeds] * len(q_values)
-    traces = trace_policies(point.world, tables, several, max_steps, task)
-    behaviours, returns = zip(*(classify(trace, max_steps) for trace in traces), strict=True)
+    runs = Runs.following(point.world, task, max_steps, tables, several, [0], epsilon=0.0)
+    found = [classify(trace, max_steps) for trace in followed(runs)]
+    behaviours, returns = zip(*found, strict=True)
     arrays = {"behaviours": behaviours, "policy_returns": returns}
     return {n: np.concatenate(parts).reshape(q_values.shape[:2]) for n, parts in arrays.items()}
 

@@ -3,7 +3,6 @@
 Names are imported on first use, so that `import taichi_ants` is quick and does not start Taichi.
 """
 
-import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -76,26 +75,7 @@ __all__ = [
 __dir__ = __all__.copy  # completion lists only public names
 
 
-def _show_pages_in_notebooks() -> None:
-    """Register worlds, colonies, traces and recordings with IPython, if it runs, to be drawn."""
-    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
-    if shell is None:
-        return
-
-    def page_of(shown: object) -> str | None:
-        from taichi_ants.viewer import notebook
-
-        return notebook(shown)
-
-    formatter = shell.display_formatter.formatters["text/html"]
-    formatter.for_type_by_name("taichi_ants.engines.colony.colony", "Colony", page_of)
-    formatter.for_type_by_name("taichi_ants.engines.runs.results", "Trace", page_of)
-    formatter.for_type_by_name("taichi_ants.viewer.frames", "Recording", page_of)
-    formatter.for_type_by_name("taichi_ants.worlds.world", "World", page_of)
-
-
 prepare_for_taichi()
-_show_pages_in_notebooks()
 
 
 def __getattr__(name: str) -> object:

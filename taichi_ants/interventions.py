@@ -28,7 +28,6 @@ from taichi_ants.errors import (
     refuse,
 )
 from taichi_ants.features import FEATURES
-from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.settings import (
     Setting,
     Settings,
@@ -95,12 +94,9 @@ class ShorthandSettings(Settings):
     def _short(cls, value: Any) -> dict[str, Any] | None:
         """Return the settings that a single value stands for; None if it is not allowed."""
         is_whole = isinstance(value, (int, np.integer)) and not is_flag(value)
-        cells = value if isinstance(value, str) else entries_of(value)
-        short = {"number": value, "level": value} if is_whole else {}
-        short |= {"share": value} if isinstance(value, float) else {}
-        short |= {"value": value} | ({} if cells is None else {"cells": cells})
-        name = next((name for name in cls.short_for if name in short), None)
-        return None if name is None else {name: short[name]}
+        fits = {"number": is_whole, "level": is_whole, "share": isinstance(value, float)}
+        fits |= {"cells": isinstance(value, str) or entries_of(value) is not None, "value": True}
+        return next(({name: value} for name in cls.short_for if fits[name]), None)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the settings that differ from their defaults, JSON-compatible."""
@@ -142,8 +138,13 @@ class Intervention(ShorthandSettings):
 
     def check(self) -> None:
         super().check()
-        if not isinstance(cells := getattr(self, "cells", None), str | None):
-            object.__setattr__(self, "cells", _checked_cells(f"{self.path}.cells", cells))
+        cells, path = getattr(self, "cells", None), f"`{self.path}.cells`"
+        if not isinstance(cells, str | None):
+            rows = as_array(path, cells, "iu")
+            if not len(rows) or rows.shape[1:] not in ((), (3,)):
+                refuse(path, cells, "a list of cells, each three whole numbers [x, y, z]")
+            cells = tuple(rows.tolist() if rows.ndim == 1 else map(tuple, rows.tolist()))
+            object.__setattr__(self, "cells", cells)
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         """Raise an AntsError if the change is impossible in worlds like this one, with this task.
@@ -206,11 +207,6 @@ class AddAnts(_OfAnts, path="add_ants"):
     `nest`, nests take turns, and ants on given cells belong to the nearest queen.
     """
 
-    heading: Annotated[
-        int | None,
-        Setting("heading of the new ants; random if left out", least=0, most=N_HEADINGS - 1),
-    ] = None
-
 
 @dataclass(frozen=True)
 class SetAnts(Intervention, path="ants", short_for=("number",)):
@@ -242,11 +238,10 @@ class Place(Intervention, path="place", short_for=("cells",)):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
-        if self.kind is not None:
+        if self.kind is not None and self.kind not in task.foods:
             none = "left out, because the task has no kinds of food in `task.foods`"
             allowed = f"one of {', '.join(task.foods)}" if task.foods else none
-            if self.kind not in task.foods:
-                refuse("`place.kind`", self.kind, allowed)
+            refuse("`place.kind`", self.kind, allowed)
 
 
 @dataclass(frozen=True)
@@ -321,11 +316,7 @@ class SetTask(Intervention, path="task"):
         return dict(self.values)
 
     def changed(self, task: Task) -> Task:
-        """Return the task with the new values; AntsError if they name a field it does not have."""
-        for name, _ in self.values:
-            group, entry, *_ = [*name.split("."), "", ""]
-            if group in _NAMED and entry not in (known := getattr(task, group)):
-                raise AntsError(f"`task.{name}` {not_a_setting(entry, known, f'task.{group}')}")
+        """Return the task with the new values."""
         return task.replace(**nested(dict(self.values)))
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
@@ -392,11 +383,3 @@ def flat_indices(grid: AxialGrid, cells: Sequence[Any]) -> list[int]:
                 f"{grid.ranges}."
             )
     return flat
-
-
-def _checked_cells(path: str, cells: Sequence) -> tuple:
-    """Return cells as triples or flat indices; AntsError if one is neither."""
-    rows = as_array(f"`{path}`", cells, "iu")
-    if not len(rows) or rows.shape[1:] not in ((), (3,)):
-        refuse(f"`{path}`", cells, "a list of cells, each three whole numbers [x, y, z]")
-    return tuple(rows.tolist() if rows.ndim == 1 else map(tuple, rows.tolist()))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +16,8 @@ from taichi_ants.task.constants import QUEEN
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
+
+_VIEWS = {f"ant_{array.view}": array.view for _, array in arrays(ANT)}
 
 
 class Record:
@@ -43,10 +44,6 @@ class Record:
 def _none() -> np.ndarray:
     """Return an array without ants."""
     return np.zeros(0, np.int32)
-
-
-def _of_ants(view: str, snapshot: Snapshot) -> np.ndarray:
-    return snapshot.of_ants.get(view, _none())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -96,9 +93,10 @@ class Snapshot(Record):
     counts: Mapping[str, Any] = field(default_factory=dict)
     world: World | None = None
 
-    if TYPE_CHECKING:  # the views of arrays of features, see below
-
-        def __getattr__(self, name: str) -> np.ndarray: ...
+    def __getattr__(self, name: str) -> np.ndarray:
+        if name not in _VIEWS:
+            raise AttributeError(name)
+        return self.of_ants.get(_VIEWS[name], _none())
 
     def ordered(self, order: np.ndarray) -> Snapshot:
         """Return the snapshot with its ants in the order of some of their indices, int (n,)."""
@@ -117,10 +115,6 @@ class Snapshot(Record):
         """Steps from each cell to the nearest queen, without obstacles, int32 (grid.size,)."""
         queens = self.grid.cells(np.flatnonzero(self.ground == QUEEN))
         return np.min([self.grid.distances(tuple(queen)) for queen in queens.tolist()], axis=0)
-
-
-for _, array in arrays(ANT):
-    setattr(Snapshot, f"ant_{array.view}", property(partial(_of_ants, array.view)))
 
 
 def same(value: object, other: object) -> bool:

@@ -23,8 +23,7 @@ from taichi_ants import (
     train,
     worlds,
 )
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds
-from taichi_ants.engines.runs.training import trace_policies
+from taichi_ants.analysis.bounds import EpisodeBounds
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
@@ -67,7 +66,6 @@ LONE_RUNS = {
     "evaluate": lambda rules: evaluate(WORLD, TABLE, task=rules),
     "rollout": lambda rules: rollout(WORLD, TABLE, task=rules),
     "trace_training": lambda rules: trace_training(WORLD, LEARNER, task=rules),
-    "trace_policies": lambda rules: next(trace_policies(WORLD, TABLE[None], [0], task=rules)),
     "record": lambda rules: record(WORLD, task=rules),
     "RunPoint": lambda rules: RunPoint(WORLD, rules, LEARNER),
 }

@@ -24,7 +24,7 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import Policy
 from taichi_ants.studies.command_line import Parser, notice
-from taichi_ants.viewer import check_page, frame, notebook, record_colony
+from taichi_ants.viewer import check_page, page, record_colony
 
 WORLD = places.paper()
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.9)
@@ -62,13 +62,11 @@ ODD = {
     "a state": lambda _: states.state_name(2**31),
     "a first value": lambda _: offline.fitted_q_iteration(data(), initial_q=None),
     "no first value": lambda _: offline.batch_q_learning(data(), initial_q=HUGE),
-    "an offline model's": lambda _: offline.model_based(data(), TABLE, initial_q="x"),
     "by run": lambda _: offline.fitted_q_iteration(data(), by_run=np.zeros(0)),
     "a penalty": lambda _: offline.pessimistic_q_iteration(data(), penalty=HUGE),
     "a label": lambda _: learners.label(["sarsa"]),
     "a page's path": lambda _: check_page(None),
-    "a frame": lambda _: frame(SCALAR),
-    "what a notebook shows": lambda _: notebook(RAGGED),
+    "a page": lambda _: page(SCALAR),
     "numbers of worlds": lambda _: Interventions(
         Colony(WORLD, None, None, range(3), 2, sharing="frozen"), RAGGED
     ),

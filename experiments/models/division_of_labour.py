@@ -5,11 +5,11 @@ falls with each delivery. An idle ant (a nurse) starts foraging more often if th
 and its threshold low. Foragers follow a hand-written rule. See docs/models.md.
 """
 
+import model_script
 import numpy as np
 
 from taichi_ants import Colony, TrainingConfig, task, worlds
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.studies import model_script
 from taichi_ants.task import Labour, Threshold
 
 ANTS, TICKS, STEP, RELIEF = 64, 4000, 50, 1

@@ -5,10 +5,10 @@ deposits fade with the time since an ant left it. Ants with food follow it in pl
 See docs/models.md.
 """
 
+import model_script
 import numpy as np
 
 from taichi_ants import Colony, Field, TrainingConfig, worlds
-from taichi_ants.studies import model_script
 from taichi_ants.task import foraging
 
 WORLD = worlds.open_world(seed=1, ranges=(20, 20, 20))

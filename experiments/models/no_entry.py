@@ -9,13 +9,13 @@ lies on the three branches without food from the start. See docs/models.md.
 
 from typing import Annotated
 
+import model_script
 import numpy as np
 
 from taichi_ants import Colony, Field, Interventions, Pheromone, Task, World, rules
 from taichi_ants.interventions import SetTrail
 from taichi_ants.rules import pick, power
 from taichi_ants.settings import Setting
-from taichi_ants.studies import model_script
 from taichi_ants.task import Choice, Life, Traffic
 
 ANTS, TICKS, STEP = 16, 3000, 100

@@ -5,12 +5,12 @@ Ants follow a hand-written rule. The queen turns food into ants, which live for 
 the ants of the same colony without the removal. See docs/protocol.md.
 """
 
+import model_script
 import numpy as np
 
 from taichi_ants import Colony, Interventions, TrainingConfig, task, worlds
 from taichi_ants.interventions import RemoveAnts
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.studies import model_script
 
 RULES = task.foraging().replace(life={"births": True, "lifespan": 1000, "regrowth": 0})
 SHARES, REMOVAL, TICKS, STEP = (0.0, 0.25, 0.5, 0.75), 2000, 4000, 50

@@ -5,11 +5,11 @@ rule, and the ants of both nests follow and change the same trails. Both nests h
 nest's share is its part of all loads delivered in 500 ticks. See docs/models.md.
 """
 
+import model_script
 import numpy as np
 
 from taichi_ants import Colony, TrainingConfig, World, task
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.studies import model_script
 from taichi_ants.task import Food
 
 RULES = task.foraging().replace(foods={"seed": Food(loads=20)})

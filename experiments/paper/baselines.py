@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds, ExpectedEpisode
+from taichi_ants.analysis.bounds import EpisodeBounds, ExpectedEpisode
 from taichi_ants.errors import AntsError, count
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Task

@@ -10,7 +10,7 @@ from typing import Any
 from paper import quantities
 from paper.comparison import VARIANTS, Comparison
 from paper.quantities import Quantity, grids_of
-from taichi_ants.analysis.findings import Contrast, Criterion, Finding, Verdict, judge, weakest
+from taichi_ants.analysis.findings import Criterion, Finding, Verdict, judge, weakest
 from taichi_ants.analysis.tables import Table, interval, number, sentence, tally
 from taichi_ants.files import tomllib
 
@@ -86,10 +86,7 @@ def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
     grids = {delivery: grids_of(comparison, delivery) for delivery in comparison.delivery_settings}
     contrasts = {
         (claim, delivery): [
-            Contrast(
-                *(label, effect(grid), claim.criterion, claim.quantity.uses_iqm),
-                *(claim.quantity.possible, claim.quantity.of_estimates),
-            )
+            claim.quantity.contrast(label, effect(grid), claim.criterion)
             for label, effect in claim.quantity.effects.items()
         ]
         for claim in claims

@@ -10,7 +10,7 @@ configurations that differ only in it.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, partial
 from typing import Any, NamedTuple
 
@@ -26,7 +26,8 @@ from paper.comparison import (
     GridPoint,
     Variant,
 )
-from taichi_ants.analysis.findings import UNBOUNDED
+from taichi_ants.analysis.findings import UNBOUNDED, Contrast, Criterion
+from taichi_ants.analysis.statistics import interquartile_values
 from taichi_ants.measures.finished import LONE, WINDOW
 
 SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)
@@ -132,12 +133,42 @@ READS: dict[str, Read] = {  # by their names in `claims.toml`
 }
 
 
+@dataclass(frozen=True, eq=False)
+class ContrastOfEstimates(Contrast):
+    """A contrast by a smooth function of k estimates, float (k, ...) -> float (...).
+
+    It is for questions such as whether 8 effects are unequal: in the values of a single seed, noise
+    would make them unequal. Values are float64 (k, seeds).
+    """
+
+    of_estimates: Callable[[np.ndarray], np.ndarray] = field(kw_only=True)
+
+    def reading(self, uses_iqm: bool) -> tuple[np.ndarray, bool]:
+        values = interquartile_values(self.values) if uses_iqm else self.values
+        return jackknife_values(self.of_estimates, values), False
+
+
+def jackknife_values(
+    statistic: Callable[[np.ndarray], np.ndarray], values: np.ndarray
+) -> np.ndarray:
+    """Return a pseudo-value for each seed, of a smooth function of means over seeds.
+
+    Their mean is the statistic, float (..., k) -> float (k,), without its bias of order 1/n, and
+    their spread is that of the statistic. With a single seed they are nan.
+    """
+    n = values.shape[-1]
+    if n < 2:
+        return np.full(n, np.nan)
+    total = values.sum(axis=-1, keepdims=True)
+    return n * statistic(total / n) - (n - 1) * statistic((total - values) / (n - 1))
+
+
 @dataclass(frozen=True)
 class Quantity:
     """One or more numbers for each seed, in one unit, on which a claim is tested.
 
-    `effects` compute them, by label, for example "Q-learning minus SARSA". `possible` and
-    `of_estimates` are those of a `Contrast`; with `of_estimates`, effects are float64 (k, seeds).
+    `effects` compute them, by label, for example "Q-learning minus SARSA". `possible` is that of a
+    `Contrast`. With `of_estimates`, effects are float64 (k, seeds); see `ContrastOfEstimates`.
     """
 
     words: str
@@ -155,6 +186,13 @@ class Quantity:
         others, and an IQM would hide failures of a quarter of all runs.
         """
         return self.possible == UNBOUNDED
+
+    def contrast(self, label: str, values: np.ndarray, criterion: Criterion) -> Contrast:
+        """Return the contrast of an effect."""
+        facts = (label, values, criterion, self.uses_iqm, self.possible)
+        if self.of_estimates is None:
+            return Contrast(*facts)
+        return ContrastOfEstimates(*facts, of_estimates=self.of_estimates)
 
 
 def of(read: Read, measure: str, *variants: Variant) -> Quantity:

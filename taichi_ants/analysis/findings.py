@@ -7,7 +7,7 @@ is judged by its IQM or its mean over seeds; if by its IQM, it is also judged by
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -16,8 +16,6 @@ import numpy as np
 from taichi_ants.analysis.statistics import (
     cautious_interval,
     interquartile_mean,
-    interquartile_values,
-    jackknife_values,
     without_noise,
 )
 from taichi_ants.errors import count
@@ -89,13 +87,10 @@ class Contrast:
 
     Attributes:
         label: The name in tables, for example "Q-learning minus SARSA".
-        values: Float64 (seeds,), or (k, seeds) with `of_estimates`. Seeds with a missing value
+        values: Float64 (seeds,), or (k, seeds) if a subclass reads them. Seeds with a missing value
             (nan) are left out, unless it is missing for all seeds.
         uses_iqm: Whether it is judged by the interquartile mean (IQM) over seeds.
         possible: The range of possible estimates; the interval is clipped to it.
-        of_estimates: A smooth function of k estimates, float (k, ...) -> float (...), or None. It
-            is for questions such as whether 8 effects are unequal: in the values of a single seed,
-            noise would make them unequal.
     """
 
     label: str
@@ -103,7 +98,6 @@ class Contrast:
     criterion: Criterion
     uses_iqm: bool = False
     possible: tuple[float, float] = UNBOUNDED
-    of_estimates: Callable[[np.ndarray], np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         known = ~np.isnan(np.atleast_2d(self.values)).any(axis=0)
@@ -122,10 +116,7 @@ class Contrast:
 
     def reading(self, uses_iqm: bool) -> tuple[np.ndarray, bool]:
         """Return numbers to average over seeds, float64 (seeds,), and whether to use the IQM."""
-        if self.of_estimates is None:
-            return self.values, uses_iqm
-        values = interquartile_values(self.values) if uses_iqm else self.values
-        return jackknife_values(self.of_estimates, values), False
+        return self.values, uses_iqm
 
 
 @dataclass(frozen=True)

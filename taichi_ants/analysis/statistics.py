@@ -9,18 +9,13 @@ middle half of the runs (Agarwal et al. 2021). Each has two intervals:
 - Student's t. For the IQM it is the interval of Tukey and McLaughlin (1963).
 
 Tables and figures show the bootstrap interval. Verdicts on claims use the hull of both intervals,
-because each can be too short. Their level is corrected for the number of verdicts. A bootstrap of
-few seeds never exceeds its most extreme resample, and the t interval is a point if the middle half
-consists of ties.
-
-The resampling weights come from a fixed random generator and depend only on the number of seeds, so
-that results are reproducible.
+because each can be too short. A bootstrap of few seeds never exceeds its most extreme resample, and
+the t interval is a point if the middle half consists of ties.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -33,7 +28,6 @@ TIE_TOLERANCE = 1e-9
 _BLOCK_ROWS = 256
 _BLOCK_DRAWS = 4096
 _BLOCK_WEIGHTS = 1 << 19  # 4 MB as float64, which fits into processor caches
-_MOST_KEPT = 1 << 27  # weights of one byte each, in memory
 
 
 @lru_cache(maxsize=2)
@@ -42,28 +36,23 @@ def resampling_counts(n: int, resamples: int = RESAMPLES, iqm: bool = False) -> 
 
     With `iqm`, only the middle half of each resample counts, and seeds must be *in ascending order
     of their values*. Sorting a resample does not change that order, so all rows can share them.
+    Results are reproducible, because the generator depends on nothing but n.
     """
-    counts = np.empty((resamples, n), np.uint8)
-    for start, block in _drawn(n, resamples, iqm):
-        counts[start : start + len(block)] = block
-    counts.setflags(write=False)
-    return counts
-
-
-def _drawn(n: int, resamples: int, iqm: bool) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield blocks of `resampling_counts`: the index of the first resample, and the counts."""
     random = np.random.default_rng((RANDOM_SEED, n))
+    counts = np.empty((resamples, n), np.uint8)
     size = min(_BLOCK_DRAWS, max(1, _BLOCK_WEIGHTS // n))  # the size does not change the numbers
     for start in range(0, resamples, size):
-        shape = min(size, resamples - start), n
-        drawn = random.integers(0, n, size=shape)
+        block = counts[start : start + size]
+        drawn = random.integers(0, n, size=block.shape)
         drawn += n * np.arange(len(drawn))[:, None]
-        drawn = np.bincount(drawn.ravel(), minlength=drawn.size).reshape(shape)
+        drawn = np.bincount(drawn.ravel(), minlength=drawn.size).reshape(block.shape)
         if iqm:
             cut = n // 4
             until = drawn.cumsum(axis=1, dtype=np.int32).clip(cut, n - cut)
             drawn = np.diff(until, axis=1, prepend=np.int32(cut))
-        yield start, drawn
+        block[:] = drawn
+    counts.setflags(write=False)
+    return counts
 
 
 def interquartile_mean(values: np.ndarray) -> np.ndarray:
@@ -206,21 +195,6 @@ def all_equal(values: np.ndarray) -> np.ndarray:
     return np.ptp(values, axis=1) <= TIE_TOLERANCE * np.abs(values).max(axis=1)
 
 
-def jackknife_values(
-    statistic: Callable[[np.ndarray], np.ndarray], values: np.ndarray
-) -> np.ndarray:
-    """Return a pseudo-value for each seed, of a smooth function of means over seeds.
-
-    Their mean is the statistic, float (..., k) -> float (k,), without its bias of order 1/n, and
-    their spread is that of the statistic. With a single seed they are nan.
-    """
-    n = values.shape[-1]
-    if n < 2:
-        return np.full(n, np.nan)
-    total = values.sum(axis=-1, keepdims=True)
-    return n * statistic(total / n) - (n - 1) * statistic((total - values) / (n - 1))
-
-
 def _bca(values: np.ndarray, level: float, resamples: int) -> np.ndarray:
     from scipy.special import ndtr, ndtri, stdtrit
 
@@ -264,14 +238,10 @@ def _resampled_means(deviations: np.ndarray, resamples: int, iqm: bool = False) 
     """Return means, float64 (rows, resamples); with `iqm`, rows must be in ascending order."""
     n = deviations.shape[1]
     draws = np.empty((len(deviations), resamples))
-    if n * resamples > _MOST_KEPT:
-        blocks = _drawn(n, resamples, iqm)
-    else:
-        kept, size = resampling_counts(n, resamples, iqm), max(1, _BLOCK_WEIGHTS // n)
-        blocks = ((start, kept[start : start + size]) for start in range(0, resamples, size))
-    for start, counts in blocks:
-        some = slice(start, start + len(counts))
-        np.matmul(deviations, counts.astype(float).T, out=draws[:, some])
+    counts, size = resampling_counts(n, resamples, iqm), max(1, _BLOCK_WEIGHTS // n)
+    for start in range(0, resamples, size):
+        some = slice(start, start + size)
+        np.matmul(deviations, counts[some].astype(float).T, out=draws[:, some])
     draws /= n
     return draws
 

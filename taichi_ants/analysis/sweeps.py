@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import gaps_in_words, means_in_words
 from taichi_ants.analysis.statistics import Estimator, estimates, known_means
 from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence
+from taichi_ants.errors import count
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -155,59 +156,47 @@ def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
 
 
 def draw_design(
-    path: Path,
-    settings: Sequence[Settings],
-    names: Sequence[str],
-    logarithmic: Container[str],
-    values: np.ndarray,
-    words: str,
+    path: Path, settings: Sequence[Settings], names: Sequence[str], values: np.ndarray, words: str
 ) -> None:
-    """Draw a measure against each setting that varies, a panel per setting and a dot per point.
+    """Draw a measure against each of some settings, a panel for each.
 
-    `settings` are those of P points, `names` the settings to show, `logarithmic` those with such an
-    axis, `values` the measure, float64 (P, S), of S seeds, and `words` its name.
+    `settings` are those of P points, `values` the measure, float64 (P, S), of S seeds, and `words`
+    its name. A panel has means over an eighth of the points, or over those with the same choice.
 
     Raises:
         AntsError: The file (.png) cannot be written.
     """
-    means = known_means(values)
-    settings = [row for row, mean in zip(settings, means, strict=True) if np.isfinite(mean)]
-    means = means[np.isfinite(means)]
-    rows = -(-len(names) // _COLUMNS)
+    means, rows = known_means(values), -(-len(names) // _COLUMNS)
+    lines = {name: {words: _parts_of([row[name] for row in settings], means)} for name in names}
     with style.styled():
         figure = style.new_figure(1.2 + 2.0 * rows)
         panels = figure.subplots(rows, min(_COLUMNS, len(names)), sharey=True, squeeze=False)
         for axes in panels.flat[len(names) :]:
             axes.set_visible(False)
         for axes, name in zip(panels.flat, names, strict=False):
-            x, log = np.array([row[name] for row in settings]), name in logarithmic
-            if are_numbers([row[name] for row in settings]):
-                parts = np.array_split(np.argsort(x, kind="stable"), min(_PARTS, len(x)))
-                middles = [np.exp(np.log(x[p]).mean()) if log else x[p].mean() for p in parts]
-                ends = middles, [means[part].mean() for part in parts]
-                axes.plot(*ends, color=style.INK, linewidth=1.2)
-                if log:
-                    style.logarithmic(axes.xaxis, (1,))
-            else:
-                choices, x = np.unique([str(row[name]) for row in settings], return_inverse=True)
-                for n in range(len(choices)):
-                    mean = means[x == n].mean()
-                    axes.hlines(mean, n - 0.3, n + 0.3, color=style.INK, linewidth=1.2)
-                labels = [choice.replace("_", "\n") for choice in choices]
-                axes.set_xticks(range(len(choices)), labels, fontsize=8)
-                x = x + 0.5 * ((np.arange(len(x)) * 0.618) % 1 - 0.5)  # spreads the dots evenly
-            size = 6 if len(x) > 200 else 14
-            axes.scatter(x, means, s=size, color=style.SKY, alpha=0.6, linewidths=0)
+            draw_lines(axes, lines[name], [*lines.values()])
+            if axes.get_xscale() == "log":
+                style.logarithmic(axes.xaxis, (1,))  # instead of a tick for each mean
             axes.set_xlabel(short(name, names))
         figure.supylabel(words)
-        seeds = values.shape[1]
-        over = f"the mean over {seeds} seeds" if seeds > 1 else "one seed"
         caption = (
-            f"A dot is a point of the design, {over}. Lines: means over an eighth of the points, "
-            f"or over those with the same choice.{gaps_in_words(values)}"
+            "Means over an eighth of the points, or over those with the same choice, with 95 % "
         )
+        caption += f"intervals. A point is the mean of {count(values.shape[1], 'seed')}."
         style.frame(figure, f"{sentence(words)} against each setting", caption, {})
     style.save(figure, path)
+
+
+def _parts_of(column: Sequence[Any], means: np.ndarray) -> list[tuple[Any, ...]]:
+    """Return for `draw_lines` the means over parts of the points, by their values in a column."""
+    choices, part = np.unique(column, return_inverse=True)
+    if is_range := are_numbers(column) and len(choices) > _PARTS:
+        part = np.argsort(np.argsort(column, kind="stable")) * _PARTS // len(column)
+    points = []
+    for n in range(part.max() + 1):
+        middle = np.median(np.array(column)[part == n]) if is_range else choices[n].item()
+        points.append((middle, *estimates(means[None, part == n], uses_iqm=False)[0][:3]))
+    return points
 
 
 def _far_apart(numbers: Sequence[float]) -> bool:

@@ -26,8 +26,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     many = whole_number(1, 1_000_000)
     about = "number of drawn inputs of each rule"
     parser.add_argument("--inputs", type=many, default=4000, metavar="N", help=about)
-    settings, _ = parser.parse_given(arguments)
-    return settings
+    return parser.parse_args(arguments)
 
 
 def run(settings: argparse.Namespace) -> None:

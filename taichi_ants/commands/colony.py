@@ -71,7 +71,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--render", metavar="PATH", help=picture)
     add("--frame-interval", **COUNT, default=2, help="ticks per frame of an animation")
     command_line.add_common(parser)
-    parser.open_settings = ("world", "task", "training")
+    parser.open_settings = ("world",)
     command_line.add_settings(parser, queueing())
     command_line.add_settings(parser, _LEARNING)
 

@@ -95,7 +95,7 @@ def add_options(parser: Parser, flags: Container[str], **defaults: Any) -> None:
         if flag in flags:
             parser.add_argument(flag, **{"help": words, **reading})
     parser.set_defaults(**defaults)
-    parser.open_settings = ("world", "task", "training")
+    parser.open_settings = ("world",)
     add_settings(parser, TASK)
     add_settings(parser, TRAINING)
 

@@ -94,7 +94,7 @@ def run(settings: argparse.Namespace) -> None:
             session = Session.load(settings.session, progress)
     else:
         session = Session(choices.setup(START))
-        session.leap(LEARNED)
+        session.advance(LEARNED)
     prepare = partial(load_plugin, settings.plugin) if settings.plugin else None
     room = SessionServer(session, choices, settings.port, prepare, playing=not settings.session)
     print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)

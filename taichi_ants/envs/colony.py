@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from taichi_ants.arguments import checked_task
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.rollout import Rollout, TablePolicy
 from taichi_ants.envs.vector import (
     ACTION_MASKS,
     Ants,
@@ -21,7 +18,6 @@ from taichi_ants.envs.vector import (
     Rules,
     Step,
     Worlds,
-    task_of,
 )
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features.support import BASE, CASTES, CHOICE
@@ -31,7 +27,6 @@ from taichi_ants.task.events import Event
 # The default length of a colony's episode, in ticks.
 MAX_STEPS = 1000
 SUPPORTS = BASE - CHOICE - CASTES - {"choice.rule=softmax"}  # actions are given
-METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 
 class ColonyWorlds(Ants):
@@ -48,18 +43,16 @@ class ColonyWorlds(Ants):
     def __init__(
         self,
         n_worlds: int,
-        task: Rules | None,
         arguments: Arguments,
         ants: int,
         start: str,
         capacity: int | None = None,
         supports: Collection[str] = SUPPORTS,
     ) -> None:
-        task = checked_task(task_of(task), "this environment", supports)
-        super().__init__(n_worlds, task, arguments, supports, METADATA["render_modes"])
+        super().__init__(n_worlds, arguments, "this environment", supports, "leave it out")
         self.colony = Colony(
             [self.worlds[w % len(self.worlds)] for w in range(n_worlds)],
-            replace(task, evaporation_in_evaluation=task.evaporation_in_training),
+            replace(self.task, evaporation_in_evaluation=self.task.evaporation_in_training),
             training=None,
             seeds=range(n_worlds),
             ants=ants,
@@ -72,8 +65,6 @@ class ColonyWorlds(Ants):
         self.events = np.full(shape, Event.NONE, np.int64)
         self.deliveries = np.zeros(shape, np.int64)
         self._last: dict[str, np.ndarray] = {}  # at the end of episodes, in mode SAME_STEP
-        # Events and states of the last step, before worlds have begun again.
-        self._results = np.zeros(0, np.uint8), np.zeros(0, np.int32)
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
         new = np.array([seed is not None for seed in seeds]) & which
@@ -113,7 +104,6 @@ class ColonyWorlds(Ants):
             terminated = np.zeros_like(terminated)
         if self.mode is AutoresetMode.SAME_STEP and (over.any() or terminated.any()):
             self._last = self.facts()
-        self._results = self.events.astype(np.uint8).reshape(-1), self.states().copy()
         begins = over
         if self.mode is not AutoresetMode.SAME_STEP:
             begins = waiting & (self.mode is AutoresetMode.NEXT_STEP)
@@ -121,23 +111,6 @@ class ColonyWorlds(Ants):
             self.begin(begins, [None] * len(begins))
         truncated = np.repeat(over, self.colony.capacity)
         return self.rewards.reshape(-1), terminated.reshape(-1), truncated
-
-    def play(
-        self, into: Rollout, finals: np.ndarray, waiting: np.ndarray, choices: TablePolicy | None
-    ) -> None:
-        masks = choices.masks() if choices is not None else None
-        for t, actions in enumerate(into.actions):
-            if choices is not None and masks is not None:
-                actions[:] = choices.draw(masks.take(self.states()))
-            rewards, terminated, truncated = self.advance(actions, waiting)
-            into.rewards[t], into.terminated[t], into.truncated[t] = rewards, terminated, truncated
-            into.events[t], finals[t] = self._results
-            ended = truncated.reshape(self.acted.shape)[:, 0]
-            waiting = ended | (waiting & (self.mode is AutoresetMode.DISABLED))
-            into.observations[t + 1] = self.shown.show(self.states())
-
-    def states(self) -> np.ndarray:
-        return self.colony.states.reshape(-1)
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
         if last:
@@ -210,8 +183,6 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
     - All others: See `HexForageVectorEnv`; `render` draws each ant's world.
     """
 
-    metadata = METADATA
-
     def __init__(
         self,
         num_envs: int = 64,
@@ -223,17 +194,16 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         observation_format: ObservationFormat = "cells",
         autoreset_mode: str | AutoresetMode = AutoresetMode.SAME_STEP,
         render_mode: str | None = None,
-        max_episode_steps: int | None = None,
     ) -> None:
         n, ants = checked_whole("num_envs", num_envs), checked_whole("ants", ants)
         if n % ants:
             raise AntsError(
                 f"num_envs is {num_envs}; it counts ants, so it must be a multiple of ants, {ants}."
             )
-        arguments = Arguments(world, max_steps, observation_format, render_mode, max_episode_steps)
+        arguments = Arguments(world, task, max_steps, observation_format, render_mode)
         # The number of ants is fixed.
         supports = SUPPORTS - {"life.births", "life.lifespan"}
-        worlds = ColonyWorlds(n // ants, task, arguments, ants, start, supports=supports)
+        worlds = ColonyWorlds(n // ants, arguments, ants, start, supports=supports)
         super().__init__(worlds, n // ants, n, autoreset_mode, render_mode)
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
         if worlds.task.delivery == "terminates" and not same_step:

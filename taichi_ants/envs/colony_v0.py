@@ -8,9 +8,9 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import seeding
 
-from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
+from taichi_ants.envs.colony import MAX_STEPS, ColonyWorlds
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.vector import Arguments, Place, Rules
+from taichi_ants.envs.vector import METADATA, Arguments, Place, Rules
 from taichi_ants.errors import missing, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Life
@@ -66,8 +66,8 @@ class HexColonyParallelEnv(ParallelEnv):
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
     ) -> None:
-        arguments = Arguments(world, max_steps, observation_format, render_mode)
-        self._worlds = ColonyWorlds(1, task, arguments, ants, start, capacity)
+        arguments = Arguments(world, task, max_steps, observation_format, render_mode)
+        self._worlds = ColonyWorlds(1, arguments, ants, start, capacity)
         self.render_mode = render_mode
         colony = self._worlds.colony
         foods, life = len(colony.worlds[0].foods), colony.task.life

@@ -11,13 +11,14 @@ from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.spaces import Discrete
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from taichi_ants.arguments import checked_task
+from taichi_ants.arguments import checked_share
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.rollout import Rollout, TablePolicy
+from taichi_ants.envs.rollout import Rollout, checked_plan
 from taichi_ants.envs.vector import (
     ACTION_MASKS,
+    METADATA,
     Ants,
     AntVectorEnv,
     Arguments,
@@ -26,15 +27,15 @@ from taichi_ants.envs.vector import (
     Rules,
     Step,
     Worlds,
-    task_of,
 )
-from taichi_ants.errors import check_one_of, checked_whole, shown
+from taichi_ants.errors import as_array, check_one_of, checked_whole, expect, shown, whole
 from taichi_ants.features.support import CHOICE, LONE
+from taichi_ants.grid.constants import STREAM_ROLLOUT
+from taichi_ants.grid.randomness import stream_state
 from taichi_ants.task.constants import EPISODE_STEPS, N_ACTIONS
 
 SUPPORTS = LONE - CHOICE - {"choice.rule=softmax"}  # actions are given
 DELIVERIES = ("terminates", "truncates", "continues")
-METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
 # The command to an ant after the last step of an episode.
@@ -50,13 +51,10 @@ _PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64
 class LoneAnts(Ants):
     """Many ants, each alone in its world; a single launch steps all of them."""
 
-    def __init__(
-        self, n: int, task: Rules | None, delivery: str | None, arguments: Arguments
-    ) -> None:
-        task = checked_task(
-            task_of(task), "an environment of one ant", SUPPORTS, "leave it out, or use a Colony"
-        )
-        super().__init__(n, task, arguments, SUPPORTS, METADATA["render_modes"])
+    def __init__(self, n: int, delivery: str | None, arguments: Arguments) -> None:
+        what, instead = "an environment of one ant", "leave it out, or use a Colony"
+        super().__init__(n, arguments, what, SUPPORTS, instead)
+        task = self.task
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
         most = _MOST_CELLS // self.worlds[0].grid.size
@@ -78,27 +76,8 @@ class LoneAnts(Ants):
         results = arrays["results"]
         return arrays["rewards_of"].copy(), results & TERMINATED != 0, results & TRUNCATED != 0
 
-    def play(
-        self, into: Rollout, finals: np.ndarray, waiting: np.ndarray, choices: TablePolicy | None
-    ) -> None:
-        policy = choices and (choices.masks(), choices.streams, choices.epsilon)
-        rows = {
-            "taken": into.actions,
-            "seen": into.observations[1:],
-            "rewards_of": into.rewards,
-            "result_rows": into.events,
-            "final_states": finals,
-        }
-        self.batched.rollout(rows, self.shown.table, waiting, _AFTER_END[self.mode], policy)
-        np.not_equal(into.events & TERMINATED, 0, out=into.terminated)
-        np.not_equal(into.events & TRUNCATED, 0, out=into.truncated)
-        np.bitwise_and(into.events, TRUNCATED - 1, out=into.events)
-
     def over(self) -> np.ndarray:
         return self.batched.arrays["results"] >= TRUNCATED
-
-    def states(self) -> np.ndarray:
-        return self.batched.arrays["states"]
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
         arrays, when = self.batched.arrays, "final_" if last else ""
@@ -174,8 +153,8 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
     ) -> None:
-        arguments = Arguments(world, max_steps, observation_format, render_mode)
-        self._ants = LoneAnts(1, task, delivery, arguments)
+        arguments = Arguments(world, task, max_steps, observation_format, render_mode)
+        self._ants = LoneAnts(1, delivery, arguments)
         self._arrays, self.render_mode = self._ants.batched.arrays, render_mode
         self.observation_space, self.action_space = self._ants.shown.space, Discrete(N_ACTIONS)
 
@@ -247,11 +226,10 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
     - `world`: See `HexForageEnv`; or a list of n worlds with the same ranges, of which environment
     i has entry i modulo n.
     - `autoreset_mode`: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
-    - `max_episode_steps`: The step limit of `gymnasium.make_vec`; the smaller limit counts.
     - All others: See `HexForageEnv`; `render` draws all worlds.
     """
 
-    metadata = METADATA
+    _ants: LoneAnts
 
     def __init__(
         self,
@@ -263,9 +241,80 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | None = None,
     ) -> None:
         n = checked_whole("num_envs", num_envs)
-        arguments = Arguments(world, max_steps, observation_format, render_mode, max_episode_steps)
-        ants = LoneAnts(n, task, delivery, arguments)
+        arguments = Arguments(world, task, max_steps, observation_format, render_mode)
+        ants = LoneAnts(n, delivery, arguments)
         super().__init__(ants, n, n, autoreset_mode, render_mode)
+
+    def rollout(
+        self,
+        policy: Any,
+        steps: int | None = None,
+        *,
+        epsilon: float = 0.0,
+        seed: int | None = None,
+        out: Rollout | None = None,
+    ) -> Rollout:
+        """Return the results of several steps, with given actions or by a policy.
+
+        The results are equal to those of `step` with the same actions, in all autoreset modes, and
+        you can mix both. In mode "Disabled", an environment whose episode has ended waits in the
+        remaining steps, with reward 0 and the same observation.
+
+        Args:
+            policy: The actions, integers 0 to 4 (steps, num_envs). Or a policy that all ants
+                follow: action values, float (n_states, 5), an object with such `q_values`, the name
+                of a policy ("trail_follower", "random"), or the path of a policy file.
+            steps: The number of steps, if a policy is given.
+            epsilon: The probability with which an ant that follows a policy acts at random.
+            seed: The seed of the policy's random numbers, which also break ties. None draws one
+                from `np_random`, which `reset(seed=...)` seeds.
+            out: An earlier rollout of the same size. This call overwrites its arrays, instead of
+                creating new ones.
+
+        Raises:
+            ResetNeeded: No episode has begun, or autoreset_mode is "Disabled" and one has ended.
+            InvalidAction: The actions have another shape or type, or an action does not exist.
+            AntsError: The policy or another argument is not allowed.
+        """
+        waiting, ants, n = self._waiting("rollout"), self._ants, self.num_envs
+        length, actions, q_values = checked_plan(policy, steps, n, ants.task)
+        epsilon, choices = checked_share("epsilon", epsilon), None
+        shape, table = (length, n), ants.shown.table
+        into = Rollout(
+            np.empty((length + 1, n, *table.shape[1:]), table.dtype),
+            np.empty(shape, np.int64),
+            *(np.empty(shape), np.empty(shape, bool), np.empty(shape, bool)),
+            events=np.empty(shape, np.uint8),
+            final_observations=table[:0],
+        )
+        if out is not None:
+            expect("out", out, Rollout)
+            for name, mine, wanted in zip(into._fields[:-1], out, into, strict=False):
+                as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
+            into = out
+        if actions is not None:
+            into = into._replace(actions=actions)
+        if q_values is not None:
+            drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
+            best = q_values >= q_values.max(axis=1, keepdims=True)
+            streams = stream_state(drawn, STREAM_ROLLOUT, np.arange(n))
+            choices = best @ (1 << np.arange(N_ACTIONS)), streams, epsilon
+        finals = np.empty(shape, np.int32)
+        into.observations[0] = ants.shown.show(ants.batched.arrays["states"])
+        rows = {
+            "taken": into.actions,
+            "seen": into.observations[1:],
+            "rewards_of": into.rewards,
+            "result_rows": into.events,
+            "final_states": finals,
+        }
+        ants.batched.rollout(rows, table, waiting, _AFTER_END[ants.mode], choices)
+        np.not_equal(into.events & TERMINATED, 0, out=into.terminated)
+        np.not_equal(into.events & TRUNCATED, 0, out=into.truncated)
+        np.bitwise_and(into.events, TRUNCATED - 1, out=into.events)
+        over = into.terminated | into.truncated
+        if ants.mode is AutoresetMode.SAME_STEP:
+            return into._replace(final_observations=ants.shown.show(finals[over]))
+        return into._replace(final_observations=into.observations[1:][over])

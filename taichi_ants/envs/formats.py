@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from taichi_ants.errors import AntsError, as_array, check_one_of
+from taichi_ants.errors import as_array, check_one_of
 from taichi_ants.learners.policies import finite
 from taichi_ants.task import Observation, observations
 from taichi_ants.task.constants import N_ACTIONS
 
 ObservationFormat = Literal["cells", "index", "one_hot"]
 FORMATS: tuple[str, ...] = get_args(ObservationFormat)
-_MOST_NUMBERS = 1 << 25  # in the table of all states
 
 
 class Shown:
@@ -42,11 +40,6 @@ class Shown:
         elif form == "cells":
             self.space = spaces.MultiDiscrete(list(parts))
         else:
-            if sum(parts) * n_states > _MOST_NUMBERS:
-                raise AntsError(
-                    f"observation_format is 'one_hot', but {observation.name!r} has {n_states} "
-                    'states and no shape; use "index", or register it with a shape.'
-                )
             self.space = spaces.Box(0.0, 1.0, (sum(parts),), np.float32)
 
     @cached_property
@@ -67,17 +60,6 @@ class Shown:
         """Return the observations (..., *space.shape) of states, integers of any shape (...)."""
         # `take` with "clip" is ten times as fast as `table[states]`.
         return self.table.take(states, axis=0, mode="clip")
-
-    def states(self, shown: np.ndarray) -> np.ndarray:
-        """Return the states, int64 (...), of observations (..., *space.shape)."""
-        shown = np.asarray(shown)
-        if self.form == "index":
-            return shown.astype(np.int64)
-        if self.form == "one_hot":
-            begins = np.cumsum((0, *self.observation.parts))
-            shown = np.stack([shown[..., a:b].argmax(-1) for a, b in pairwise(begins)], axis=-1)
-        digits = tuple(np.moveaxis(shown.astype(np.int64), -1, 0))
-        return np.ravel_multi_index(digits, self.observation.parts)
 
 
 def tabulate(

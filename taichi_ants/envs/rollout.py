@@ -9,12 +9,9 @@ import numpy as np
 from gymnasium.error import InvalidAction
 
 from taichi_ants.errors import checked_whole, shown
-from taichi_ants.grid.randomness import GAMMA, mix
 from taichi_ants.learners.policies import checked_table, frozen_policy
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
-
-_ALL_ACTIONS = (1 << N_ACTIONS) - 1  # a mask, in which bit a is action a
 
 
 class Rollout(NamedTuple):
@@ -39,45 +36,6 @@ class Rollout(NamedTuple):
     truncated: np.ndarray
     events: np.ndarray
     final_observations: np.ndarray
-
-
-class TablePolicy(NamedTuple):
-    """The choices of n ants by a table of action values.
-
-    Attributes:
-        q_values: Action values, float32 (n_states, 5).
-        streams: The state of each ant's random stream, uint64 (n,), separate from the streams of
-            the environments.
-        epsilon: The probability of a random action.
-    """
-
-    q_values: np.ndarray
-    streams: np.ndarray
-    epsilon: float
-
-    def masks(self) -> np.ndarray:
-        """Return the actions with the largest value in each state, as bits: int64 (n_states,)."""
-        best = self.q_values >= self.q_values.max(axis=1, keepdims=True)
-        return best @ (1 << np.arange(N_ACTIONS))
-
-    def draw(self, masks: np.ndarray) -> np.ndarray:
-        """Return an action of each ant's mask, int64 (n,), with the draw of `rules.policy.choose`.
-
-        With probability epsilon, the action is any of the five.
-        """
-        self.streams[:] += np.uint64(GAMMA)
-        bits = mix(self.streams)
-        explores = bits >> np.uint64(32) < np.uint64(self.epsilon * 4294967296.0)
-        allowed = np.where(explores, _ALL_ACTIONS, masks)
-        words = bits & np.uint64(0xFFFFFFFF)
-        k = (words * _COUNTS.take(allowed) >> np.uint64(32)).astype(np.int64)
-        return _KTH.take(allowed * N_ACTIONS + k)
-
-
-_BITS = np.arange(_ALL_ACTIONS + 1)[:, None] >> np.arange(N_ACTIONS) & 1
-# Action number k of each mask, and the number of actions of each mask.
-_KTH = np.argsort(1 - _BITS, axis=1, kind="stable").reshape(-1)
-_COUNTS = _BITS.sum(axis=1).astype(np.uint64)
 
 
 def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:

@@ -15,20 +15,10 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from taichi_ants.arguments import check_ranges, checked_max_steps, checked_share, checked_world
+from taichi_ants.arguments import check_ranges, checked_max_steps, checked_task, checked_world
 from taichi_ants.envs.formats import ObservationFormat, Shown
-from taichi_ants.envs.rollout import Rollout, TablePolicy, checked_actions, checked_plan
-from taichi_ants.errors import (
-    AntsError,
-    as_array,
-    check_one_of,
-    checked_whole,
-    expect,
-    shown,
-    whole,
-)
-from taichi_ants.grid.constants import STREAM_ROLLOUT
-from taichi_ants.grid.randomness import stream_state
+from taichi_ants.envs.rollout import checked_actions
+from taichi_ants.errors import AntsError, as_array, check_one_of, shown
 from taichi_ants.task import Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, N_STATES, PICK_UP
 from taichi_ants.task.states import state_from_index
@@ -54,14 +44,17 @@ def _action_masks() -> np.ndarray:
 ACTION_MASKS = _action_masks()  # the actions that can succeed, by the paper's state: int8 (128, 5)
 
 
+METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+
 class Arguments(NamedTuple):
     """The arguments that all environments have, see `HexForageEnv`."""
 
     world: Worlds
+    task: Rules | None
     max_steps: int
     observation_format: ObservationFormat
     render_mode: str | None
-    max_episode_steps: int | None = None
 
 
 class Ants(ABC):
@@ -80,18 +73,20 @@ class Ants(ABC):
     def __init__(
         self,
         n_worlds: int,
-        task: Task,
         arguments: Arguments,
+        what: str,
         supports: Collection[str],
-        render_modes: Sequence[str],
+        instead: str,
     ) -> None:
-        self.task, self.worlds = task, _worlds_of(arguments.world, n_worlds, supports)
+        task = arguments.task
+        if isinstance(task, str):
+            check_one_of("task", task, tuple(Task.named()))
+            task = Task.named()[task]
+        self.task = task = checked_task(task, what, supports, instead)
+        self.worlds = _worlds_of(arguments.world, n_worlds, supports)
         if arguments.render_mode is not None:
-            check_one_of("render_mode", arguments.render_mode, render_modes)
+            check_one_of("render_mode", arguments.render_mode, METADATA["render_modes"])
         self.max_steps = checked_max_steps(arguments.max_steps, task)
-        if arguments.max_episode_steps is not None:
-            limit = checked_whole("max_episode_steps", arguments.max_episode_steps)
-            self.max_steps = min(self.max_steps, limit)
         self.shown = Shown(task.sees, arguments.observation_format)
         self._scene: Any = None  # of `draw`
 
@@ -111,26 +106,8 @@ class Ants(ABC):
         """
 
     @abstractmethod
-    def play(
-        self, into: Rollout, finals: np.ndarray, waiting: np.ndarray, choices: TablePolicy | None
-    ) -> None:
-        """Take the steps of a rollout, and write its arrays.
-
-        Args:
-            into: Has the actions, unless there are `choices`. Its first observations stay as they
-                are, as do its final ones.
-            finals: int32 (steps, n): where an episode ends in mode SAME_STEP, its last state.
-            waiting: As in `advance`. Worlds that end in mode DISABLED wait in all further steps.
-            choices: The policy of all ants, or None.
-        """
-
-    @abstractmethod
     def over(self) -> np.ndarray:
         """Return whether the last step ended the episode of each world, bool (W,)."""
-
-    @abstractmethod
-    def states(self) -> np.ndarray:
-        """Return the present state of each ant, integers (n,)."""
 
     @abstractmethod
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
@@ -162,14 +139,6 @@ def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World,
     return tuple(built)
 
 
-def task_of(task: Rules | None) -> Task:
-    """Return the task that is given as one or by its name, or the paper's."""
-    if isinstance(task, str):
-        check_one_of("task", task, tuple(Task.named()))
-        return Task.named()[task]
-    return Task() if task is None else task
-
-
 class OfAnts:
     """Base of environments, which know whether they were reset."""
 
@@ -180,11 +149,6 @@ class OfAnts:
         if not self._begun:
             raise ResetNeeded(f"no episode has begun; call reset() before {what}.")
 
-    @property
-    def max_steps(self) -> int:
-        """The step limit of an episode."""
-        return self._ants.max_steps
-
 
 class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
     """Base of the vector environments.
@@ -193,6 +157,8 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
     info is an array with an entry for each environment. Its mask `_name`, bool (num_envs,), is True
     for environments that have this info.
     """
+
+    metadata = METADATA
 
     def __init__(
         self,
@@ -305,67 +271,6 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             return np.zeros(self._n_worlds, bool)
         return self._ants.over()
-
-    def rollout(
-        self,
-        policy: Any,
-        steps: int | None = None,
-        *,
-        epsilon: float = 0.0,
-        seed: int | None = None,
-        out: Rollout | None = None,
-    ) -> Rollout:
-        """Return the results of several steps, with given actions or by a policy.
-
-        The results are equal to those of `step` with the same actions, in all autoreset modes, and
-        you can mix both. In mode "Disabled", an environment whose episode has ended waits in the
-        remaining steps, with reward 0 and the same observation.
-
-        Args:
-            policy: The actions, integers 0 to 4 (steps, num_envs). Or a policy that all ants
-                follow: action values, float (n_states, 5), an object with such `q_values`, the name
-                of a policy ("trail_follower", "random"), or the path of a policy file.
-            steps: The number of steps, if a policy is given.
-            epsilon: The probability with which an ant that follows a policy acts at random.
-            seed: The seed of the policy's random numbers, which also break ties. None draws one
-                from `np_random`, which `reset(seed=...)` seeds.
-            out: An earlier rollout of the same size. This call overwrites its arrays, instead of
-                creating new ones.
-
-        Raises:
-            ResetNeeded: No episode has begun, or autoreset_mode is "Disabled" and one has ended.
-            InvalidAction: The actions have another shape or type, or an action does not exist.
-            AntsError: The policy or another argument is not allowed.
-        """
-        waiting, ants, n = self._waiting("rollout"), self._ants, self.num_envs
-        length, actions, q_values = checked_plan(policy, steps, n, ants.task)
-        epsilon, choices = checked_share("epsilon", epsilon), None
-        shape, table = (length, n), ants.shown.table
-        into = Rollout(
-            np.empty((length + 1, n, *table.shape[1:]), table.dtype),
-            np.empty(shape, np.int64),
-            *(np.empty(shape), np.empty(shape, bool), np.empty(shape, bool)),
-            events=np.empty(shape, np.uint8),
-            final_observations=table[:0],
-        )
-        if out is not None:
-            expect("out", out, Rollout)
-            for name, mine, wanted in zip(into._fields[:-1], out, into, strict=False):
-                as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
-            into = out
-        if actions is not None:
-            into = into._replace(actions=actions)
-        if q_values is not None:
-            drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
-            streams = stream_state(drawn, STREAM_ROLLOUT, np.arange(n))
-            choices = TablePolicy(q_values, streams, epsilon)
-        finals = np.empty((length, n), np.int32)
-        into.observations[0] = ants.shown.show(ants.states())
-        ants.play(into, finals, waiting, choices)
-        over = into.terminated | into.truncated
-        if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            return into._replace(final_observations=ants.shown.show(finals[over]))
-        return into._replace(final_observations=into.observations[1:][over])
 
     def _infos(self, facts: dict[str, np.ndarray], have: np.ndarray) -> dict[str, Any]:
         infos: dict[str, Any] = dict(facts)

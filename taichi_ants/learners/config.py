@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError
 from taichi_ants.settings import Setting, Settings, Share, declared
 
 if TYPE_CHECKING:
@@ -87,13 +87,7 @@ class TrainingConfig(Settings, path="training"):
         for setting in declared(TrainingConfig):
             object.__setattr__(self, setting.name, values[setting.name])
         self.check()
-        try:
-            pairs = {**dict(hyperparameters), **more}
-        except (TypeError, ValueError):
-            raise AntsError(
-                f"hyperparameters is {shown(hyperparameters)}; it must be a mapping of names to "
-                "numbers."
-            ) from None
+        pairs = {**dict(hyperparameters), **more}
         plain = {name: getattr(value, "item", lambda v=value: v)() for name, value in pairs.items()}
         object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
 

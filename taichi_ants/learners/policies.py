@@ -44,20 +44,6 @@ class Policy(NamedTuple):
         task = Task.from_dict(self.metadata.get("task", {}))
         return replace(task, observation=self.observation)
 
-    def actions(self, states: npt.ArrayLike, rng: np.random.Generator) -> npt.NDArray[np.int64]:
-        """Return an action with the largest value in each state; `rng` breaks ties.
-
-            observations, infos = envs.reset(seed=0)
-            envs.step(policy.actions(infos["state"], rng))
-
-        States are an integer or integers of any shape; AntsError if a state does not exist.
-        """
-        expect("rng", rng, np.random.Generator)
-        states = as_array("states", states, "iu", None, 0, len(self.q_values) - 1)
-        values = self.q_values[states]
-        best = values == values.max(axis=-1, keepdims=True)
-        return np.where(best, rng.random(values.shape), -1.0).argmax(axis=-1)
-
 
 def random_policy(observation: str = "paper") -> ActionValues:
     """Return the policy that takes each of the five actions with equal probability."""

@@ -30,7 +30,7 @@ LOAD = "load"  # pages' name for a replay: of an uploaded file, or to undo a cha
 def recording(snapshots: Snapshots) -> Recording:
     """Return a recording of a session."""
     (*_, session), frames = zip(*snapshots, strict=True)
-    return Recording(session.header(), list(frames))
+    return Recording(session.recorder.header(), list(frames))
 
 
 def gif_bytes(snapshots: Snapshots) -> bytes:

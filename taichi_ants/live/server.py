@@ -1,11 +1,11 @@
-"""The server of the live page, and the thread that runs its session.
+"""The server of the live page and of its session.
 
 The server is reachable only from this machine. It serves the live page and a WebSocket for each
 open page; a socket requires the server's own page and its token. Pages send requests as JSON, see
 `SessionServer._do`; the server sends JSON messages and frames, see `taichi_ants.viewer.frames`.
 
-The thread that calls `SessionServer.run` serves the sockets. Another one, `_engine`, performs the
-requests of pages and runs the session, one call at a time. What takes long is a job, see
+The thread that calls `SessionServer.run` serves the sockets. What takes long runs in another
+thread, one call at a time, so that connections stay open. Work of several turns is a job, see
 `taichi_ants.live.exports`.
 """
 
@@ -21,9 +21,9 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, partial
+from functools import cache
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -52,7 +52,6 @@ _FEW = 4  # with fewer frames per episode, each frame shows another episode
 _PHASES = 24  # number of such frames that together show the course of an episode
 _STATE_EVERY = 0.5  # seconds
 _PROGRESS_EVERY = 0.2  # seconds
-_PAUSE = 0.004  # seconds in which the socket thread sends a message
 _QUIET = logging.getLogger("taichi_ants.live")  # keeps foreign requests out of the terminal
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
@@ -62,13 +61,12 @@ _QUIET.propagate = False
 _CHANGES = ("play", "step", "edit", "undo", "load", "back", "begin", "restart")
 
 _HEADERS = {
-    "Allow": "GET, HEAD",
+    "Allow": "GET",
     "Cache-Control": "no-store",
     "Content-Security-Policy": "frame-ancestors 'none'",  # the page itself contains the other rules
     "Cross-Origin-Opener-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 
@@ -86,7 +84,7 @@ class Closed(Exception):  # noqa: N818
 
 
 class Page:
-    """An open page; used in the socket thread."""
+    """An open page."""
 
     def __init__(self, connection: ServerConnection) -> None:
         self.connection = connection
@@ -150,7 +148,7 @@ class SessionServer:
         self._pages: set[Page] = set()
         self._joined = 0  # sockets, including those that have not received a session yet
         self._engine = ThreadPoolExecutor(1, "session")
-        self._loop: asyncio.AbstractEventLoop
+        self._turns = asyncio.Lock()  # for turns and requests, which use or change the session
         self._over = threading.Event()
         self._ticks_due, self._frame_steps, self._due = 0.0, 1.0, 0.0  # see _advance_frame
         self._prepare = prepare
@@ -192,29 +190,31 @@ class SessionServer:
             **{"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3},
             **{"process_request": self._open, "logger": _QUIET},
         }
-        self._loop, end = asyncio.get_running_loop(), time.monotonic() + seconds
+        end = time.monotonic() + seconds
         try:
             async with serve(self._handle_messages, sock=self._socket, **settings):
                 while not self._over.is_set() and time.monotonic() < end:
                     each_turn()
-                    await self._loop.run_in_executor(self._engine, self._turn)
+                    async with self._turns:
+                        await self._turn()
                     wait = self._due - time.monotonic() if self._runs else 1.0
                     await asyncio.sleep(0 if LOAD in self._jobs else min(wait, 1 / FRAMES_A_SECOND))
-                for page in self._pages:
-                    page.send(_message("over"))
+                self._send(_message("over"))
         finally:
             for job in self._jobs.values():
                 job.cancel()
             self._engine.shutdown()
 
-    # Methods for the engine's thread: simulation and requests.
+    async def _work(self, act: Callable[..., Any], *arguments: Any) -> Any:
+        """Return the result of a call that may take long, in the engine's thread."""
+        return await asyncio.get_running_loop().run_in_executor(self._engine, act, *arguments)
 
     @property
     def _runs(self) -> bool:
         """Whether the session runs; it pauses during a replay of the session that replaces it."""
         return self.playing and LOAD not in self._jobs
 
-    def _turn(self) -> None:
+    async def _turn(self) -> None:
         """Advance by a frame if one is due, continue jobs, and send the state from time to time."""
         runs = self._runs and bool(self._pages)  # pause if no page is open
         now = time.monotonic()
@@ -223,11 +223,11 @@ class SessionServer:
             self._next_state = now + interval
             self._send(self._state())
         for kind, job in [*self._jobs.items()]:
-            job.proceed()
+            await self._work(job.proceed)
             if job.result is not None:
                 self._finish_job(kind, job)
         if runs and time.monotonic() >= self._due:
-            self._advance_frame()
+            await self._advance_frame()
 
     def _finish_job(self, kind: str, job: Replay | Export) -> None:
         """Begin the finished session, send the finished file to its page, or send an error."""
@@ -240,7 +240,7 @@ class SessionServer:
         else:
             self._send(_message("error", words=job.result), to=job.page)
 
-    def _advance_frame(self) -> None:
+    async def _advance_frame(self) -> None:
         """Advance by the ticks of one frame, and show it."""
         began, before = time.monotonic(), self.session.steps
         if self.speed >= FASTEST:
@@ -250,7 +250,7 @@ class SessionServer:
             ticks = int(self._ticks_due)
             self._ticks_due -= ticks
         try:
-            self._advance(ticks)
+            await self._advance(ticks)
         except AntsError as error:  # for example if a learner's values are no longer finite
             self.playing = False
             self._send(_message("error", words=str(error)))
@@ -272,29 +272,32 @@ class SessionServer:
         cycle = length + 1  # including the step that begins the next episode
         return max(1, round(steps / cycle)) * cycle + max(1, length // _PHASES)
 
-    def _advance(self, ticks: int) -> None:
+    async def _advance(self, ticks: int) -> None:
         """Advance by ticks, and show them; the first call compiles kernels, which takes seconds."""
         self._compiles = self.session.steps == 0
         if self._compiles:
             self._send(self._state())
-            time.sleep(_PAUSE)  # so that the socket thread sends this state first
         try:
-            self._show(self.session.advance() if ticks == 1 else self.session.leap(ticks))
+            self._show(await self._work(self.session.advance, ticks))
         finally:
             if self._compiles:
                 self._compiles, self._next_state = False, 0.0  # send the new state at once
 
-    def _answer(self, page: Page, act: Callable[[], object]) -> None:
+    async def _answer(self, page: Page, request: Any) -> None:
         """Perform a request or send its page an error; then send the state to all pages soon."""
-        try:
-            act()
-        except (AntsError, MemoryError) as error:
-            no_memory = isinstance(error, MemoryError)
-            words = "this needs more memory than is available." if no_memory else str(error)
-            self._send(_message("error", words=words), to=page)
+        async with self._turns:
+            try:
+                await self._do(page, request)
+            except (AntsError, MemoryError) as error:
+                no_memory = isinstance(error, MemoryError)
+                words = "this needs more memory than is available." if no_memory else str(error)
+                self._send(_message("error", words=words), to=page)
+            self._send_state_soon()
+
+    def _send_state_soon(self) -> None:
         self._next_state = min(self._next_state, time.monotonic() + 1 / FRAMES_A_SECOND)
 
-    def _do(self, page: Page, request: Any) -> None:
+    async def _do(self, page: Page, request: Any) -> None:
         """Perform a JSON request of a page; raise Closed if no live page sends it."""
         if LOAD in self._jobs and isinstance(request, dict) and request.get("do") in _CHANGES:
             raise AntsError("a session is being replayed; wait until it ends, or cancel it.")
@@ -306,18 +309,19 @@ class SessionServer:
             case {"do": "step", "ticks": int(ticks)} if 1 <= ticks <= 100:
                 self.playing = False
                 for _ in range(ticks):
-                    self._advance(1)
+                    await self._advance(1)
             case {"do": "speed", "value": int(speed) | float(speed)} if 1 <= speed <= FASTEST:
                 self.speed, self._due = float(speed), time.monotonic()  # ticks/s
             case {"do": "edit", "edit": dict(edit), "stroke": int(number)}:
                 # See `edits`; the number is equal for edits of one stroke.
                 stroke = page, number
-                self._show(self.session.apply(edit, goes_on=stroke == self._stroke))
+                self._show(await self._work(self.session.apply, edit, stroke == self._stroke))
                 self._stroke = stroke
             case {"do": "undo"}:
-                self._jobs[LOAD] = Replay(*self.session.undone(), undoes=True)
+                sessions, steps = await self._work(self.session.undone)
+                self._jobs[LOAD] = Replay(sessions, steps, undoes=True)
             case {"do": "load", "content": bytes(content)}:  # which is a binary message
-                log = Log.read("the loaded file", content)
+                log = await self._work(Log.read, "the loaded file", content)
                 self._jobs[LOAD] = Replay(Session.replay(log), log.steps)
             case {"do": "back"}:  # return to the session before the present one
                 if self._previous is None:
@@ -326,12 +330,13 @@ class SessionServer:
                     )
                 self._begin(self._previous, comes_back=True)
             case {"do": "begin", "chosen": chosen}:
-                self._begin(Session(self.choices.setup(chosen)))
+                self._begin(await self._work(Session, self.choices.setup(chosen)))
             case {"do": "restart"}:
-                self._begin(Session(self.session.setup))
+                self._begin(await self._work(Session, self.session.setup))
             case {"do": "export", "kind": str(kind)} if kind in QUICK:
                 name, make = QUICK[kind]
-                self._send(_message("file", name=name), make(self.session), to=page)
+                content = await self._work(make, self.session)
+                self._send(_message("file", name=name), content, to=page)
             case {"do": "export", "kind": str(kind)} if kind in SLOW:
                 if self._jobs.keys() & SLOW.keys():
                     raise AntsError("another file is being made; wait for it, or cancel it.")
@@ -344,12 +349,6 @@ class SessionServer:
                 self.end()
             case _:
                 raise Closed("the live page never sends such a request")
-
-    def _forget(self, page: Page) -> None:
-        """Cancel the files that a disconnected page has asked for."""
-        for kind, job in [*self._jobs.items()]:
-            if job.page is page:
-                self._jobs.pop(kind).cancel()
 
     def _begin(self, session: Session, undoes: bool = False, comes_back: bool = False) -> None:
         """Replace the session; pages can return to the previous one with the request "back".
@@ -364,35 +363,29 @@ class SessionServer:
         self._undone = (session.steps, len(session.edits)) if undoes else None
         self.session, self._shown = session, secrets.token_hex(8)
         self.playing, self._frame_steps, self._stroke = False, 1.0, None
-        self._send_whole()
+        self._send_whole(self._pages)
 
-    def _send_whole(self, page: Page | None = None, begins: bool = True) -> None:
-        """Send a complete frame to a page, or to all; with `begins`, also facts of the session."""
-        messages: list[str | bytes] = [_message("snapshot"), self.session.snapshot()]
+    def _send_whole(self, pages: Iterable[Page], begins: bool = True) -> None:
+        """Send a complete frame to pages; with `begins`, also facts of the session."""
+        messages: list[str | bytes] = [_message("snapshot"), self.session.recorder.whole()]
         if begins:
-            header, setup, choices = self.session.header(), self.session.setup, self.choices
+            header, setup, choices = (
+                self.session.recorder.header(),
+                self.session.setup,
+                self.choices,
+            )
             offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
             begin = _message("begin", session=self._shown, header=header, **offered)
             messages = [begin, self._state(), *messages]
-
-        def show() -> None:
-            self._pages.update([page] if page else [])
-            for receiver in [page] if page else self._pages:
-                receiver.begin(*messages)
-
-        self._post(show)
+        for page in pages:
+            page.begin(*messages)
 
     def _show(self, frame: bytes) -> None:
         """Send a frame to all pages except those that are behind."""
-        new_names = self.session.new_state_names()
-        if new_names:
+        if new_names := self.session.recorder.new_names():
             self._send(_message("names", names=new_names))
-
-        def show() -> None:
-            for page in self._pages:
-                page.show(frame)
-
-        self._post(show)
+        for page in self._pages:
+            page.show(frame)
 
     def _state(self) -> str:
         session = self.session
@@ -412,18 +405,9 @@ class SessionServer:
         )
 
     def _send(self, *messages: str | bytes, to: Page | None = None) -> None:
-        def send() -> None:
-            for page in self._pages if to is None else [to]:
-                page.send(*messages)
-
-        self._post(send)
-
-    def _post(self, act: Callable[[], Any]) -> None:
-        """Call a function in the socket thread, in the order of these calls."""
-        with contextlib.suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(act)
-
-    # Methods for the socket thread.
+        """Send messages to a page, or to all."""
+        for page in [to] if to else self._pages:
+            page.send(*messages)
 
     def _open(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the page or an error; None opens a socket.
@@ -439,7 +423,7 @@ class SessionServer:
         # The origin of a socket must be this server. The page must not be requested by other pages.
         mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
         knows = hmac.compare_digest("".join(tokens[:1]).encode(), self.token.encode())
-        if method not in ("GET", "HEAD")[: 1 if opens else 2]:
+        if method != "GET":
             response = connection.respond(405, "Only GET is allowed here.\n")
         elif not mine or not (knows or (url.path == "/" and not tokens)):
             response = connection.respond(403, "Open the address that the command printed.\n")
@@ -455,8 +439,6 @@ class SessionServer:
             response.headers["Content-Type"] = "text/html; charset=utf-8"
         for name, value in _HEADERS.items():
             response.headers[name] = value
-        if method == "HEAD":
-            response.body = b""
         return response
 
     async def _handle_messages(self, connection: ServerConnection) -> None:
@@ -466,14 +448,18 @@ class SessionServer:
         page = Page(connection)
         self._joined += 1
         try:
-            await self._request(page, partial(self._send_whole, page))
+            async with self._turns:
+                self._pages.add(page)
+                self._send_whole([page])
+                self._send_state_soon()
             async for message in connection:
                 match request := _read(message):
                     case {"do": "seen", "frames": int(frames)} if 0 <= frames <= 1000:
                         if page.acknowledge(frames):
-                            await self._request(page, partial(self._send_whole, page, begins=False))
+                            async with self._turns:
+                                self._send_whole([page], begins=False)
                     case _:
-                        await self._request(page, partial(self._do, page, request))
+                        await self._answer(page, request)
         except Closed as error:
             await connection.close(1008, str(error))
         except ConnectionClosed:
@@ -481,11 +467,10 @@ class SessionServer:
         finally:
             self._joined -= 1
             self._pages.discard(page)
-            await self._request(page, partial(self._forget, page))
-
-    async def _request(self, page: Page, act: Callable[[], object]) -> None:
-        """Wait until the engine's thread has performed a request of a page."""
-        await self._loop.run_in_executor(self._engine, self._answer, page, act)
+            async with self._turns:  # cancel the files that this page has asked for
+                for kind in [kind for kind, job in self._jobs.items() if job.page is page]:
+                    self._jobs.pop(kind).cancel()
+                self._send_state_soon()
 
 
 def _message(kind: str, /, **facts: Any) -> str:

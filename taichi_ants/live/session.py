@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import pickle
 import tempfile
 import time
@@ -11,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from taichi_ants.viewer import Recorder
 _WRITER = "Session.save, or Save session on its page,"
 KIND = Kind("session", 4, _WRITER, most=5_000_000)
 _REPLAY_SLICE = 0.02  # seconds of a piece of a replay
-_SNAPSHOT_INTERVAL = 0.1  # seconds of simulation between snapshots, the longest replay of an undo
+_SNAPSHOT_INTERVAL = 0.1  # seconds between snapshots, the longest replay of an undo
 _MOST_KEPT = 1 << 28  # bytes of all snapshots
 _LARGEST = 1 << 26  # bytes of a colony above which there are no snapshots
 
@@ -88,14 +89,6 @@ class Log:
             )
 
 
-class _Snapshot(NamedTuple):
-    """A session before one of its changes."""
-
-    edits: int  # number of edits before the snapshot
-    spent: float  # seconds of simulation before the snapshot
-    content: bytes  # the session without its edits, pickled and compressed
-
-
 class Session:
     """A colony with all interventions since its first tick.
 
@@ -106,6 +99,7 @@ class Session:
         colony: The colony; only the session may advance it.
         edits: (steps, edit) of each edit, in order.
         changes: The index in `edits` of the first edit of each change; a stroke is one change.
+        recorder: Describes the session for pages, and makes their frames.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -116,22 +110,22 @@ class Session:
         self.changes: list[int] = []
         self._cells = 0  # in all edits
         self._begun = 0  # episodes that began after one had ended
-        self._snapshots: list[_Snapshot] = []
-        self._spent = 0.0  # seconds of simulation so far
+        # The number of edits before, and the session without its edits, pickled and compressed.
+        self._snapshots: list[tuple[int, bytes]] = []
+        self._snapshot_time = -math.inf  # of the last snapshot, in seconds
         self.interventions.length = setup.ticks_per_episode or None
         self.interventions.begin_episode()
         self.colony.observe([])  # has no effect, but compiles kernels for the first edit
         # The title must not contain the number of ants, because interventions change it.
         title = f"Ants in a world of {self.colony.grid.count} cells"
-        self._recorder = Recorder(self.colony, title=title)
-        self._recorder.note()
-        self._recorder.snapshot()
-        self._named = set(self._recorder.names())
+        self.recorder = Recorder(self.colony, title=title)
+        self.recorder.note()
+        self.recorder.snapshot()
 
     @property
     def ticks(self) -> int:
         """The number of ticks in all episodes."""
-        return self._recorder.ticks
+        return self.recorder.ticks
 
     @property
     def steps(self) -> int:
@@ -143,55 +137,31 @@ class Session:
         """Whether the episode has ended; the next step begins another one."""
         return self.colony.ticks == self.interventions.length
 
-    def header(self) -> dict[str, Any]:
-        """Return facts about all frames, see `Recorder.header`."""
-        return self._recorder.header()
-
-    def new_state_names(self) -> dict[int, tuple[str, str, list[str]]]:
-        """Return the names of states that ants have visited since the last call."""
-        if len(self._named) == self.colony.task.n_states:
-            return {}
-        new = self._recorder.names(self._named)
-        self._named |= new.keys()
-        return new
-
-    def snapshot(self) -> bytes:
-        """Return a complete frame, for a page without frames."""
-        return self._recorder.whole()
-
     def advance(self, n: int = 1) -> bytes:
-        """Return a frame of changes after up to n more ticks of this episode.
+        """Return a frame of changes after n more steps, which may span episodes.
 
-        If the episode has ended, the next one begins instead, without a tick.
-        """
-        return self._run(checked_whole("n", n), self._recorder.tick) or self._recorder.snapshot()
-
-    def leap(self, n: int) -> bytes:
-        """Return a frame of all changes after running n more steps, which may span episodes.
-
-        The frame does not have the actions of ants.
+        If an episode has ended, a step begins the next one, without a tick. The frame has the
+        actions of ants only if n is 1.
         """
         until = self.steps + checked_whole("n", n)
+        if n == 1 and not self.ended:
+            return self._run(1, self.recorder.tick)
         while self.steps < until:
             self._run(until - self.steps, self.colony.tick)
-        return self._recorder.snapshot()
+        return self.recorder.snapshot()
 
     def _run(self, n: int, tick: Callable[[int], Any]) -> Any:
         """Advance with the function `tick`; return its result, None if no tick passes."""
         if self.ended:
-            self._recorder.note(ended=True)
+            self.recorder.note(ended=True)
             self._begun += 1  # first, because Ctrl-C during a launch raises an error after it
             self.interventions.begin_episode()
             return None
         length = self.interventions.length
         n = min(n, length - self.colony.ticks) if length else n
         check_most("ticks", self.ticks + n)
-        began = time.perf_counter()
-        try:
-            frame = tick(n)
-        finally:  # also after an interrupt
-            self._spent += time.perf_counter() - began
-        self._recorder.note()
+        frame = tick(n)
+        self.recorder.note()
         return frame
 
     def apply(self, edit: object, goes_on: bool = False) -> bytes:
@@ -202,7 +172,7 @@ class Session:
         the edit is not valid or not possible; nothing has changed.
         """
         self._do(edit, goes_on)
-        return self._recorder.snapshot()
+        return self.recorder.snapshot()
 
     def _do(self, edit: object, goes_on: bool = False) -> None:
         intervention = edits.checked(edit, self.interventions)
@@ -212,9 +182,8 @@ class Session:
         begins = not (goes_on and self.changes)
         if begins:
             self._take_snapshot()
-        began = time.perf_counter()
         if "episode" in plain:
-            self._recorder.note(ended=True)
+            self.recorder.note(ended=True)
         # Recorded first, because Ctrl-C during a launch raises an error after it.
         if begins:
             self.changes.append(len(self.edits))
@@ -226,25 +195,22 @@ class Session:
             del self.changes[len(self.changes) - begins :]
             raise
         self._cells += cells_of(plain)
-        self._spent += time.perf_counter() - began
 
     def _take_snapshot(self) -> None:
         """Take a snapshot of the session, unless a replay from the last snapshot would be quick.
 
-        If snapshots take too much memory, drop the one whose neighbours are closest in time.
+        If snapshots take too much memory, drop the oldest.
         """
-        snapshots = self._snapshots
-        is_near = snapshots and self._spent - snapshots[-1].spent < _SNAPSHOT_INTERVAL
-        if is_near or self.colony.nbytes > _LARGEST:
+        now = time.perf_counter()
+        if now - self._snapshot_time < _SNAPSHOT_INTERVAL or self.colony.nbytes > _LARGEST:
             return
         bare: Any = copy.copy(self)
         bare.setup, bare.edits, bare.changes, bare._snapshots = None, [], [], []
         content = zlib.compress(pickle.dumps(bare, pickle.HIGHEST_PROTOCOL), 1)
-        snapshots.append(_Snapshot(len(self.edits), self._spent, content))
-        while len(snapshots) > 1 and sum(len(kept.content) for kept in snapshots) > _MOST_KEPT:
-            spent = [0.0, *(snapshot.spent for snapshot in snapshots)]
-            gaps = [later - before for before, later in zip(spent, spent[2:], strict=False)]
-            del snapshots[gaps.index(min(gaps))]
+        self._snapshots.append((len(self.edits), content))
+        self._snapshot_time = now
+        while sum(len(content) for _, content in self._snapshots) > _MOST_KEPT:
+            del self._snapshots[0]
 
     def values(self) -> dict[str, dict[str, Any]]:
         """Return the values that sliders can change, by name, see `edits.Value`."""
@@ -300,7 +266,7 @@ class Session:
             yield self
         yield from self._advance_to(steps)
         self.changes = list(changes)
-        self._recorder.snapshot()
+        self.recorder.snapshot()
         yield self
 
     def same(self, other: Session) -> bool:
@@ -316,11 +282,11 @@ class Session:
         if not self.changes:
             raise AntsError("there is nothing to undo: this session has no interventions.")
         *changes, last = self.changes
-        snapshots = [snapshot for snapshot in self._snapshots if snapshot.edits <= last]
+        snapshots = [(n, content) for n, content in self._snapshots if n <= last]
         if snapshots:
-            session = pickle.loads(zlib.decompress(snapshots[-1].content))
-            session.setup, session._snapshots = self.setup, snapshots
-            session.edits = self.edits[: snapshots[-1].edits]
+            n, content = snapshots[-1]
+            session = pickle.loads(zlib.decompress(content))
+            session.setup, session._snapshots, session.edits = self.setup, snapshots, self.edits[:n]
         else:
             session = Session(self.setup)
         steps, _ = self.edits[last]
@@ -335,7 +301,7 @@ class Session:
         changes = len({steps for steps, _ in log.edits})
         every = max(1, -(-(log.steps + changes) // most))
         session = cls(log.setup)
-        yield session, session.snapshot()
+        yield session, session.recorder.whole()
         for steps, edits_then in groupby([*log.edits, (log.steps, None)], lambda edit: edit[0]):
             while session.steps < steps:
                 if every == 1:
@@ -345,12 +311,12 @@ class Session:
                 for _ in session._advance_to(until):
                     pass
                 if session.steps % every == 0:
-                    yield session, session._recorder.snapshot()
+                    yield session, session.recorder.snapshot()
             edits_here = [edit for _, edit in edits_then if edit is not None]
             for edit in edits_here:
                 session._do(edit)
             if edits_here if every == 1 else steps == log.steps:
-                yield session, session._recorder.snapshot()
+                yield session, session.recorder.snapshot()
 
     def _advance_to(self, steps: int) -> Iterator[Session]:
         """Advance to a number of steps, in pieces of about `_REPLAY_SLICE` seconds."""

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import files, learners, worlds
-from taichi_ants.arguments import checked_seeds, checked_share, checked_task
+from taichi_ants import files, worlds
+from taichi_ants.arguments import checked_seeds, checked_task
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.features.support import BASE, CASTES, COLONY, FIELDS, FOODS, OWN_RULES
@@ -44,8 +44,8 @@ FORM_SUPPORTS = BASE - OWN_RULES - CASTES - FOODS - FIELDS  # of the form of the
 class Setup:
     """The initial conditions of a session.
 
-    Raises AntsError if a value is not allowed. If the world or colony cannot be built, `Session`
-    raises it.
+    Raises AntsError if a value is not allowed; `Session` raises it if the world or colony cannot be
+    built.
     """
 
     world: str  # the name of a registered world, or the text of a map
@@ -70,19 +70,14 @@ class Setup:
                     f"`task.castes.{name}.policy` is {shown(caste.policy)}, but the live page "
                     f"reads no files; choose one of {', '.join(NAMED)}, or leave it out."
                 )
-        if isinstance(self.policy, TrainingConfig):
-            check_one_of("sharing", self.sharing, ("shared", "independent"))
-            learners.get(self.policy.learner)
-        else:
+        if not isinstance(self.policy, TrainingConfig):
             object.__setattr__(self, "policy", checked_table(self.policy, self.task).copy())
         checked_whole("ants", self.ants, 1, MOST_ANTS)
         if self.capacity is None:
             object.__setattr__(self, "capacity", min(2 * self.ants + 64, MOST_ANTS))
         checked_whole("capacity", self.capacity, 1, MOST_ANTS)
-        for seed in (self.seed, self.world_seed):
-            checked_seeds([seed])
+        checked_seeds([self.seed])
         checked_whole("ticks_per_episode", self.ticks_per_episode, 0, MAX_STEPS)
-        checked_share("epsilon", self.epsilon)
         expect("world_settings", self.world_settings, Mapping)
         settings = json.loads(files.to_json(dict(self.world_settings)))
         object.__setattr__(self, "world_settings", settings)

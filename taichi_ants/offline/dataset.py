@@ -86,13 +86,6 @@ class Dataset(Record):
         most |= dict.fromkeys(("state", "next_state"), self.task.n_states)
         for name, size in most.items():
             as_array(f"{name} of a data set", getattr(self, name), "iu", None, 0, size - 1)
-        chance = self.behaviour_probability
-        wrong = ~(np.isnan(chance) | ((chance > 0) & (chance <= 1)))
-        if wrong.any():
-            raise AntsError(
-                f"a behaviour_probability of a data set is {chance[wrong][0]:g}; it must be above "
-                "0 and at most 1, or nan if it is unknown."
-            )
         # Episodes follow each other, belong to one ant each, and end at their flags.
         goes_on = ~(self.terminated | self.truncated)
         names = ("run", "episode", "agent", "step")

@@ -1,4 +1,4 @@
-"""The kernels of offline learning and off-policy evaluation.
+"""The kernels of offline learning.
 
 A single thread computes each sum, in order, so results do not depend on the number of threads.
 """
@@ -11,7 +11,6 @@ _i32 = ti.types.ndarray(dtype=ti.i32, ndim=1)
 _u8 = ti.types.ndarray(dtype=ti.u8, ndim=1)
 _f32 = ti.types.ndarray(dtype=ti.f32, ndim=1)
 _f64 = ti.types.ndarray(dtype=ti.f64, ndim=1)
-_f64_2 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
 @ti.func
@@ -91,57 +90,3 @@ def iterate(
                 entry = base * N_ACTIONS + pairs[pair]
                 change = ti.max(change, ti.abs(backed_up - q[entry]))
                 q[entry] = backed_up
-
-
-@ti.kernel
-def weigh(weights: _f64, begins: _i32, ratios: _f64):
-    """Write the importance weight of each row: the product of its episode's ratios so far."""
-    for episode in range(begins.shape[0] - 1):
-        weight = ti.f64(1.0)
-        for i in range(begins[episode], begins[episode + 1]):
-            weight *= ratios[i]
-            weights[i] = weight
-
-
-@ti.kernel
-def add_up(
-    sums: _f64_2,
-    mass: _f64_2,
-    ended: _f64_2,
-    estimates: _f64,
-    begins: _i32,
-    rewards: _i32,
-    weights: _f64,
-    counts: ti.types.ndarray(dtype=ti.u8, ndim=2),
-    weighted: ti.i32,
-    discount: ti.f64,
-):
-    """Write `estimates` by per-decision importance sampling, for each resample of the episodes.
-
-    `counts` (resamples, episodes) are the resamples. The kernel also fills three arrays of zeros,
-    (resamples, steps + 1), by step: `sums` of weight * reward, the total weight `mass`, and the
-    final weights of episodes that have just `ended`. `weighted` divides by the total weight, which
-    includes the final weights of ended episodes, rather than by the number of episodes.
-    """
-    ti.loop_config(block_dim=1)
-    for r in range(counts.shape[0]):
-        n = ti.f64(0.0)
-        for episode in range(counts.shape[1]):
-            times = ti.cast(counts[r, episode], ti.f64)
-            if times > 0:
-                first, end = begins[episode], begins[episode + 1]
-                for i in range(first, end):
-                    sums[r, i - first] += times * (weights[i] * rewards[i])
-                    mass[r, i - first] += times * weights[i]
-                ended[r, end - first] += times * weights[end - 1]
-                n += times
-        estimate, factor, gone = ti.f64(0.0), ti.f64(1.0), ti.f64(0.0)
-        for step in range(sums.shape[1]):
-            gone += ended[r, step]
-            total = n
-            if weighted == 1:
-                total = mass[r, step] + gone
-            if total > 0:
-                estimate += factor * (sums[r, step] / total)
-            factor *= discount
-        estimates[r] = estimate

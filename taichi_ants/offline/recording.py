@@ -164,18 +164,20 @@ def _dataset(pieces: list[dict[str, np.ndarray]], **known: Any) -> Dataset:
         if name in pieces[0]
     }
     pieces.clear()
-    key = rows["run"].astype(np.int64)
-    for name in ("episode", "agent"):
-        key = key * (int(rows[name].max(initial=0)) + 1) + rows[name]
-    order = np.argsort(key, kind="stable")
-    last = np.append(np.diff(key[order]) != 0, True) | rows["terminated"][order]
-    number = np.cumsum(last) - last
+
+    def in_order(*by: np.ndarray) -> None:
+        """Sort the rows by columns, first by the last one; equal rows keep their order."""
+        order = np.lexsort(by)
+        rows.update({name: array[order] for name, array in rows.items()})
+
+    in_order(rows["agent"], rows["episode"], rows["run"])
+    of_ant = np.stack([rows[name] for name in ("run", "episode", "agent")])
+    last = np.append(np.diff(of_ant).any(axis=0), True) | rows["terminated"]
     # Episodes are in the order in which they began.
-    begins = order[np.append(0, np.flatnonzero(last)[:-1] + 1)]
-    by_age = np.lexsort([rows[name][begins] for name in ("agent", "step", "episode", "run")])
-    rank = np.argsort(by_age)[number]
-    sorted_by_rank = np.argsort(rank, kind="stable")
-    rows = {name: array[order[sorted_by_rank]] for name, array in rows.items()}
-    rows["episode"] = rank[sorted_by_rank].astype(np.int32)
-    last = last[sorted_by_rank]
-    return Dataset(**known, **rows, truncated=last & ~rows["terminated"])
+    begins = np.flatnonzero(np.append(True, last[:-1]))
+    began = np.repeat(rows["step"][begins], np.diff(begins, append=len(last)))
+    rows["truncated"] = last & ~rows["terminated"]
+    in_order(rows["agent"], began, rows["episode"], rows["run"])
+    last = rows["truncated"] | rows["terminated"]
+    rows["episode"] = (np.cumsum(last) - last).astype(np.int32)
+    return Dataset(**known, **rows)

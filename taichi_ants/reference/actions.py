@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
@@ -14,11 +13,9 @@ from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick
 from taichi_ants.reference.world_state import WorldState
+from taichi_ants.task import Task, Traffic
 from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, SEES_CUE, SEES_EMPTY, SEES_GOAL
 from taichi_ants.task.events import Event
-
-if TYPE_CHECKING:
-    from taichi_ants.task import Task, Traffic
 
 # The field of `Rewards` for each event.
 PAID = {
@@ -34,24 +31,17 @@ PAID = {
 
 @dataclass(frozen=True, slots=True)
 class Intent:
-    """An ant's action, 0 to 4, and its effect if the ant wins.
-
-    Attributes:
-        heading: The heading of a move or a pick-up, towards its target.
-        target: The cell to enter, or whose food to take. None if the way is closed, no food is in
-            view, or the action is to give.
-        shows_cue: Whether the target looks T or S or, with an ant on it, is better than its cell.
-        gives: Whether the ant delivers.
-        rests: Whether the ant rests; its action is then GIVE, which has no effect.
-    """
+    """An ant's action, 0 to 4, and its effect if the ant wins."""
 
     ant: Ant
     action: int
-    heading: int = 0
+    heading: int = 0  # towards the target
+    # The cell to enter, or whose food to take. None if the way is closed, no food is in view, or
+    # the action is to give.
     target: Cell | None = None
-    shows_cue: bool = False
-    gives: bool = False
-    rests: bool = False
+    shows_cue: bool = False  # the target looks T or S or, with an ant on it, is better than its own
+    gives: bool = False  # whether the ant delivers
+    rests: bool = False  # the action is then GIVE, which has no effect
 
     @property
     def enters(self) -> bool:
@@ -172,7 +162,6 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
             event = _handle(world, intent, slot in winning, task)
         if intent.rests:
             ant.event, ant.reward = Event.NONE, 0
-            ant.carried += 1
             continue
         paid = getattr(task.rewards, PAID[event])
         if world.foods and event in (Event.PICKED_UP, Event.DELIVERED):
@@ -186,7 +175,7 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
             of_features = inputs_of(world, ant, task)
             for cell in _marked(laid, intent, start, had_food) if lays(task, ant, name) else ():
                 trail.deposit(cell, ant, tick, world.pheromones, of_features)
-    for intent, *_ in acted:
+    for intent in intents:
         intent.ant.carried += 1
     world.ants = {intent.ant.cell: intent.ant for intent in intents}
 

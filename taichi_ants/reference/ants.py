@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -11,92 +11,60 @@ from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_STA
 from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells, queens_of
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.task.events import Event
-
-if TYPE_CHECKING:
-    from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import World
 
 Pair = tuple[int, int]  # state, action
 
 
 @dataclass(slots=True)
 class Ant:
-    """An ant.
-
-    Attributes:
-        slot: The ant's place in the colony, 0 .. slots - 1; free again after its death.
-        number: 0 .. n - 1 for the initial ants; n, n + 1, ... for ants born in the episode.
-        carried: Ticks since the ant's last pick-up or delivery, its birth, or the start.
-        nest: The number of its nest.
-        kind: The kind of the last food that it picked up.
-        caste: The number of its caste.
-        trait: Its number from 0 to less than 1, which never changes.
-        own: Its values of the features of the model by name, see `reference.features`.
-        paper_state: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
-        state: The state index, by which the ant chooses and learns.
-        misread: The codes of cells in view that the ant misreads, by turns from its heading.
-        action, event, reward: The last ones; -1, NONE and 0 before the first tick.
-        executed: The last action as executed, which differs from `action` if that slipped.
-        chosen: The action already drawn for the next tick, if any.
-    """
+    """An ant."""
 
     cell: Cell
     heading: int
     carries: bool = False
-    slot: int = 0
-    number: int = 0
+    slot: int = 0  # its place in the colony, 0 .. slots - 1; free again after its death
+    number: int = 0  # 0 .. n - 1 for the initial ants; n, n + 1, ... for ants born in the episode
     stream: RandomStream = field(default_factory=lambda: RandomStream(0))
-    carried: int = 0
-    paper_state: int = 0
-    state: int = 0
-    misread: dict[int, int] = field(default_factory=dict)
-    action: int = -1
-    executed: int = -1
-    event: Event = Event.NONE
-    reward: int = 0
-    chosen: int | None = None
+    carried: int = 0  # ticks since its last pick-up or delivery, its birth, or the start
+    paper_state: int = 0  # load and codes of the cells ahead, 0 to 127; decides what actions do
+    state: int = 0  # the state index, by which it chooses and learns
+    misread: dict[int, int] = field(default_factory=dict)  # codes it misreads, by relative heading
+    action: int = -1  # the last one; -1 before the first tick
+    executed: int = -1  # the last action as executed, which differs from `action` if that slipped
+    event: Event = Event.NONE  # of the last action
+    reward: int = 0  # of the last action
+    chosen: int | None = None  # the action already drawn for the next tick
     nest: int = 0
-    kind: int = 0
+    kind: int = 0  # of the last food that it picked up
     caste: int = 0
-    trait: float = 0.0
-    own: dict[str, Any] = field(default_factory=dict)
-
-    def copy(self) -> Ant:
-        """Return the ant as it is now; its random stream stays the same."""
-        return replace(self, own={**self.own})
+    trait: float = 0.0  # from 0 to less than 1; never changes
+    own: dict[str, Any] = field(default_factory=dict)  # values of features of the model by name
 
 
 @dataclass(kw_only=True, slots=True)
 class Transition:
-    """The transition of one ant in one tick, from which it learns.
-
-    Attributes:
-        episode, step: The episode in the run and the tick in the episode, from 0.
-        cell, heading, state: Values before the tick.
-        action, executed: The action that the ant chose, and the one that it executed.
-        next_state, next_action: Values after the tick; the action is None if none was drawn.
-        terminated: Whether the ant delivered into a terminal state: the update does not bootstrap.
-        truncated: Whether this is the ant's last update of the episode without `terminated`: the
-            last tick, the ant's death, or a delivery that ends the episode but is not terminal.
-        td_error: The error of this step's update, without planning; None without learning.
-    """
+    """The transition of one ant in one tick, from which it learns."""
 
     slot: int
     number: int
     episode: int
-    step: int
-    cell: Cell
-    heading: int
-    state: int
+    step: int  # the tick in the episode, from 0
+    cell: Cell  # before the tick
+    heading: int  # before the tick
+    state: int  # before the tick
     action: int
     reward: int
     event: Event
     next_state: int
-    next_action: int | None
-    terminated: bool
+    next_action: int | None  # None if none was drawn
+    terminated: bool  # a delivery into a terminal state, after which the update does not bootstrap
+    # The ant's last update of the episode without `terminated`: in the last tick, at its death, or
+    # after a delivery that ends the episode but is not terminal.
     truncated: bool
     nest: int = 0
     caste: int = 0
-    td_error: np.float32 | None = None
+    td_error: np.float32 | None = None  # without planning; None without learning
     executed: int = -1
 
     @property

@@ -7,19 +7,16 @@ word decides whether the ant explores, slips or misreads; its low word decides e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.geometry import neighbour
-from taichi_ants.reference.observations import is_better, nestmate
+from taichi_ants.reference.observations import cells_in_view, is_better, nestmate
 from taichi_ants.reference.random_stream import WORDS, RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.rules.functions import exp, power
+from taichi_ants.task import Choice, Traffic
 from taichi_ants.task.constants import (
-    FORWARD,
     GIVE,
     LEFT,
     N_ACTIONS,
@@ -29,9 +26,6 @@ from taichi_ants.task.constants import (
     SEES_EMPTY,
     SEES_GOAL,
 )
-
-if TYPE_CHECKING:
-    from taichi_ants.task import Choice, Traffic
 
 
 def choose_action(
@@ -68,6 +62,24 @@ def weighted(weights: Sequence[float], word: int) -> int:
     return len(weights) - 1
 
 
+def ways(
+    world: WorldState, ant: Ant, codes: Sequence[int], traffic: Traffic
+) -> tuple[list[bool], list[bool]]:
+    """Return which cells ahead an ant can enter, and which are nearer to its queen.
+
+    Only an ant with a compass knows the latter. `codes` are those of the cells as it sees them.
+    """
+    has_compass = world.has_compass(ant)
+    is_open = [code in (SEES_EMPTY, SEES_CUE) for code in codes]
+    nearer = [code == SEES_CUE and has_compass for code in codes]
+    for side, cell in enumerate(cells_in_view(ant)):
+        if cell in world.ants and side - 1 not in ant.misread:
+            nearer[side] = has_compass and is_better(world, ant, cell)
+            if traffic.shared and nestmate(world, ant, cell):
+                is_open[side] = ant.carries or traffic.follow
+    return is_open, nearer
+
+
 def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -> int:
     """Return an action by the rule of Deneubourg et al. (1990), which needs no action values."""
     assert choice.k is not None
@@ -76,23 +88,16 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
     seen = [ant.state >> 4 & 3, ant.state >> 2 & 3, ant.state & 3]
     if SEES_GOAL in seen:
         return GIVE if ant.carries else PICK_UP
-    weights, nearer = [0.0, 0.0, 0.0], [False, False, False]
-    cue = world.cue(ant)
+    weights, cue = [0.0, 0.0, 0.0], world.cue(ant)
     if world.has_compass(ant) and choice.carriers_follow is not None:
         cue = world.pheromones[choice.carriers_follow]
-    for side in (LEFT, FORWARD, RIGHT):
-        cell = neighbour(ant.cell, (ant.heading + side - 1) % N_HEADINGS)
-        misread = side - 1 in ant.misread
-        nearer[side] = seen[side] == SEES_CUE
-        enters = seen[side] in (SEES_EMPTY, SEES_CUE)
-        if nestmate(world, ant, cell) and not misread and traffic.shared:
-            enters = ant.carries or traffic.follow
-            nearer[side] = ant.carries and is_better(world, ant, cell)
-        if enters:
-            level = 0.0 if misread else float(cue.level(cell))
+    is_open, nearer = ways(world, ant, seen, traffic)
+    for side, cell in enumerate(cells_in_view(ant)):
+        if is_open[side]:
+            level = 0.0 if side - 1 in ant.misread else float(cue.level(cell))
             weights[side] = power(choice.k + level, choice.exponent)
     if not any(weights):
         return (LEFT, RIGHT)[pick(low, 2)]
-    if world.has_compass(ant) and any(weights[side] and nearer[side] for side in range(3)):
-        weights = [weights[side] if nearer[side] else 0.0 for side in range(3)]
+    best = [weights[side] if nearer[side] else 0.0 for side in range(3)]
+    weights = best if any(best) else weights
     return weighted(weights, low)

@@ -60,25 +60,6 @@ class ReferenceColony:
 
     The arguments are those of `Colony`, which checks them. If ants have independent tables, a
     newborn ant starts with the initial value, not with `q_values`.
-
-    Attributes:
-        world: The present state of the world; each episode starts from `start_world`.
-        n_ants: The number of ants at the start of an episode.
-        starting: The number of these ants by nest.
-        ants: The living ants by slot, 0 to `slots` - 1.
-        streams: The random streams of the initial ants, which continue through all episodes.
-        next_number: The number of the next ant that is added.
-        stores: Food items that each queen will turn into ants.
-        queen_stream: The queen's random stream, which continues; wandering food also uses it.
-        learns: Whether ants learn.
-        learners: The tables: one for each slot if they are independent, else for each nest and
-            caste; see `table_of`.
-        epsilon, learning_rate: Values in the present episode, float64.
-        episode: The number of the episode in the run, from 0; -1 before the first.
-        record: The sums of the present or latest episode.
-        records: The sums of the finished episodes.
-        transitions: The transition of each ant that acted in the last tick, by slot.
-        over: Whether the episode has ended at a delivery; no further tick is possible.
     """
 
     def __init__(
@@ -105,10 +86,12 @@ class ReferenceColony:
             self._row = lambda world, ant: int(task.sees.encode(view_of(world, ant, task.sees)))
             self._turns = task.sees.cells
         self.start_world, self.training = world, training
-        self.n_ants, self._ends_at_delivery = ants, ends_at_delivery
+        self._ends_at_delivery = ends_at_delivery
+        self.n_ants = ants  # at the start of an episode
         self.slots = capacity or (2 * ants + 64 if task.life.births else ants)
         self.seed, self.start = seed, start
         self.sharing, self.learns = sharing, sharing != "frozen"
+        # Both continue through all episodes; wandering food uses the queen's stream, too.
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         self._make = partial(LEARNERS[training.learner], training, task.n_states)
@@ -120,10 +103,11 @@ class ReferenceColony:
         for number in range(n if sharing != "independent" else 0):
             if (policy := castes[number % len(castes)].policy) is not None:
                 tables[number] = frozen_policy(policy, task.observation)
+        # One for each slot if they are independent, else for each nest and caste.
         self.learners = [self._make(table) for table in tables]
-        self.epsilon, self.learning_rate = training.epsilon, training.learning_rate
-        self.episode = -1
-        self.records: list[EpisodeRecord] = []
+        self.epsilon, self.learning_rate = training.epsilon, training.learning_rate  # now
+        self.episode = -1  # before the first
+        self.records: list[EpisodeRecord] = []  # of the finished episodes
         self._set_up()
 
     @property
@@ -137,31 +121,26 @@ class ReferenceColony:
             return ant.slot
         return ant.nest * max(1, len(self.castes)) + ant.caste
 
-    def _is_frozen(self, ant: Ant) -> bool:
-        """Return whether the table of an ant never changes."""
-        follows = self.sharing == "shared" and caste_of(self.task, ant).policy is not None
-        return not self.learns or follows
-
     def _set_up(self) -> None:
         """Reset everything that lasts for one episode."""
         self.world = WorldState(self.start_world, self.task, self.learns)
         self.food_sources = FoodSources(self.start_world)
-        self.stores = [0] * len(self.world.queens)
-        self.next_number = self.n_ants
+        self.stores = [0] * len(self.world.queens)  # food that each queen will turn into ants
+        self.next_number = self.n_ants  # of the next ant that is added
         self.record = EpisodeRecord()
-        self.over = False
-        self.transitions: list[Transition] = []
-        self.ants: dict[int, Ant] = {}
+        self.over = False  # whether a delivery has ended the episode, so that no tick follows
+        self.transitions: list[Transition] = []  # of the ants that acted in the last tick, by slot
+        self.ants: dict[int, Ant] = {}  # the living ants by slot
         begin = starts(self.start_world, self.seed, self.n_ants, self.start)
         nests = [nest_of(self.start_world, number) for number in range(self.n_ants)]
-        self.starting = Counter(nests)
-        left = {
-            nest: castes_at_start(self.castes, nest, self.starting[nest])
-            for nest in (range(len(self.world.queens)) if self.castes else ())
-        }
+        self.starting = Counter(nests)  # ants at the start by nest
+        left = [
+            castes_at_start(self.castes or [Caste()], nest, self.starting[nest])
+            for nest in range(len(self.world.queens))
+        ]
         for number, (cell, heading) in enumerate(begin):
             nest, stream = nests[number], self.streams[number]
-            caste = left[nest].pop(0) if self.castes else 0
+            caste = left[nest].pop(0)
             self.add(Ant(cell, heading, False, number, number, stream, nest=nest, caste=caste))
         for ant in self.ants.values():
             self.observe(ant)
@@ -187,9 +166,8 @@ class ReferenceColony:
         """Update the paper's state and the state index of an ant, which may misread cells."""
         ant.paper_state, ant.misread = observe(self.world, ant), {}
         sees = hooks(self.task, "see") if self.episode >= 0 else []  # not before the first episode
-        for turn, code in zip(
-            self._turns, codes_in_view(self.world, ant, self._turns), strict=True
-        ):
+        codes = codes_in_view(self.world, ant, self._turns)
+        for turn, code in zip(self._turns, codes, strict=True):
             seen = code
             for see in sees:
                 seen = see(self, ant, seen)
@@ -220,8 +198,7 @@ class ReferenceColony:
         assert not self.over
         tick = self.record.ticks
         acting = [self.ants[slot] for slot in sorted(self.ants)]
-        before = [ant.copy() for ant in acting]
-        traffic = self.task.traffic
+        before = [replace(ant) for ant in acting]
         intents = []
         for ant in acting:
             if self._any("choose", ant):
@@ -233,7 +210,7 @@ class ReferenceColony:
             action = ant.action
             for execute in hooks(self.task, "execute"):
                 action = execute(self, ant, action)
-            intents.append(intend(self.world, ant, action, traffic))
+            intents.append(intend(self.world, ant, action, self.task.traffic))
         carry_out(self.world, intents, tick, self.task)
         for intent in intents:
             picked = intent.target if intent.ant.event is Event.PICKED_UP else None
@@ -281,9 +258,9 @@ class ReferenceColony:
 
     def _draw_action(self, ant: Ant, tick: int) -> int:
         caste, choice = caste_of(self.task, ant), self.task.choice
-        numbers = {name: getattr(caste, name) for name in ("temperature", "k", "exponent")}
-        numbers = {name: number for name, number in numbers.items() if number is not None}
-        choice = replace(choice, **numbers) if numbers else choice
+        for name in ("temperature", "k", "exponent"):
+            if (number := getattr(caste, name)) is not None:
+                choice = replace(choice, **{name: number})
         if choice.rule == "deneubourg":
             return choose_cell(self.world, ant, choice, self.task.traffic)
         values = self.learners[self.table_of(ant)].rows[ant.state] if choice.needs_table else []
@@ -362,30 +339,29 @@ class ReferenceColony:
         `pairs` has each forager before and after the tick.
         """
         self.transitions = []
+        members: dict[int, list[tuple[Ant, Transition]]] = defaultdict(list)
         same = ("slot", "number", "action", "executed", "reward", "event", "nest", "caste")
         for was, ant in pairs:
             terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
+            number, follows = self.table_of(ant), caste_of(self.task, ant).policy is not None
+            learns = self.learns and not (follows and self.sharing == "shared")
             # After a delivery that terminates, the ant chooses at the start of its next tick.
-            draws_ahead = self.learners[self.table_of(ant)].draws_next_action
-            if draws_ahead and not self._is_frozen(ant) and not terminated:
+            if learns and self.learners[number].draws_next_action and not terminated:
                 ant.chosen = self._draw_action(ant, self.record.ticks + 1)
-            self.transitions.append(
-                Transition(
-                    **{name: getattr(ant, name) for name in same},
-                    **{name: getattr(was, name) for name in ("cell", "heading", "state")},
-                    episode=self.episode,
-                    step=self.record.ticks,
-                    next_state=ant.state,
-                    next_action=ant.chosen,
-                    terminated=terminated,
-                    truncated=not terminated
-                    and (last or ant.slot not in self.ants or ant.slot in stopping),
-                )
+            stops = last or ant.slot not in self.ants or ant.slot in stopping
+            step = Transition(
+                **{name: getattr(ant, name) for name in same},
+                **{name: getattr(was, name) for name in ("cell", "heading", "state")},
+                episode=self.episode,
+                step=self.record.ticks,
+                next_state=ant.state,
+                next_action=ant.chosen,
+                terminated=terminated,
+                truncated=stops and not terminated,
             )
-        members: dict[int, list[tuple[Ant, Transition]]] = defaultdict(list)
-        for (_, ant), step in zip(pairs, self.transitions, strict=True):
-            if not self._is_frozen(ant):
-                members[self.table_of(ant)].append((ant, step))
+            self.transitions.append(step)
+            if learns:
+                members[number].append((ant, step))
         for number, of_table in members.items():
             learner, caste = self.learners[number], caste_of(self.task, of_table[0][0])
             rate, discount = caste.learning_rate, caste.discount

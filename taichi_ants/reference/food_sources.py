@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.reference.geometry import Cell, kinds_of_food, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
-
-if TYPE_CHECKING:
-    from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import World
 
 
 @dataclass(slots=True)
@@ -76,10 +73,8 @@ class FoodSources:
     def regrow(self, world: WorldState, delays: Sequence[int | None], tick: int) -> int:
         """Let food grow back where food sources have waited long enough, and their cell is empty.
 
-        `delays` are ticks, by kind of food; None means that the kind does not grow back.
-
-        Returns:
-            The number of loads that grew back.
+        `delays` are ticks, by kind of food; None means that the kind does not grow back. Returns
+        the number of loads that grew back.
         """
         regrown = 0
         for source in self.food_sources:

@@ -6,14 +6,10 @@ the smallest coordinate is 0. The keys of dictionaries are normal forms, too.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
-
-if TYPE_CHECKING:
-    from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import World
 
 Cell = tuple[int, int, int]
 

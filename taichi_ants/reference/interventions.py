@@ -1,4 +1,4 @@
-"""Interventions: changes of a colony between two ticks."""
+"""Interventions: changes of a colony between two ticks, and protocols, which say when."""
 
 from __future__ import annotations
 
@@ -7,40 +7,34 @@ from dataclasses import replace
 from typing import Any
 
 import taichi_ants.interventions as language
-from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_INTERVENTION
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_INTERVENTION
+from taichi_ants.protocol import At, Every, ProtocolEvent, When
 from taichi_ants.reference.ants import Ant, start_order
-from taichi_ants.reference.colony import ReferenceColony
+from taichi_ants.reference.colony import EpisodeRecord, ReferenceColony
 from taichi_ants.reference.features.castes import draw_caste
 from taichi_ants.reference.geometry import (
     Cell,
     distance,
     existing_cells,
-    kinds_of_food,
     listed_cells,
     normal_form,
 )
+from taichi_ants.reference.measures import measured
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
-from taichi_ants.worlds.world import World
 
 REACH = 8  # the most cells by which an ant is moved aside
 
 
 class Interventions:
-    """Changes of a colony during an episode.
+    """Changes of a colony during the present episode.
 
-    A cell on which something cannot be placed stays as it is. `ants` is the number of ants at the
-    start of later episodes.
+    A cell on which something cannot be placed stays as it is.
     """
 
     def __init__(self, colony: ReferenceColony) -> None:
-        self.colony, self.ants, self._first = colony, colony.n_ants, colony.start_world
-        self._foods = kinds_of_food(self._first)  # when later episodes start
-        self._set_stream()
-
-    def _set_stream(self) -> None:
-        """Start the stream of random numbers of the present episode."""
-        state = stream_state(self.colony.seed, STREAM_INTERVENTION, max(self.colony.episode, 0))
+        self.colony = colony
+        state = stream_state(colony.seed, STREAM_INTERVENTION, max(colony.episode, 0))
         self._stream = RandomStream(state)
 
     def apply(self, change: Any) -> None:
@@ -50,14 +44,9 @@ class Interventions:
         """
         colony, world = self.colony, self.colony.world
         match change:
-            case language.Episode():
-                self._begin_episode()
-            case language.SetEpsilon():
-                colony.epsilon = change.value
-                colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
-            case language.SetLearningRate():
-                colony.learning_rate = change.value
-                constant: dict[str, Any] = {"learning_rate_decay": 1.0, "min_learning_rate": 0.0}
+            case language.SetEpsilon() | language.SetLearningRate():
+                setattr(colony, change.path, change.value)
+                constant: dict[str, Any] = {f"{change.path}_decay": 1.0, f"min_{change.path}": 0.0}
                 colony.training = replace(colony.training, **constant)
             case language.SetTask():
                 colony.task = change.changed(colony.task)
@@ -79,18 +68,18 @@ class Interventions:
                 else:
                     self._remove([ant for ant in ants if ant.cell in cells])
             case language.AddAnts(cells=None):
-                self._add_some(self._amount(change), change.heading, change.nest)
+                self._add_some(self._amount(change), change.nest)
             case language.AddAnts():
                 nests = range(len(world.queens)) if change.nest is None else [change.nest]
                 nearest = [
                     min(nests, key=lambda nest: distance(cell, world.queens[nest]))
                     for cell in cells
                 ]
-                self._add(cells, nearest, change.heading)
+                self._add(cells, nearest)
             case language.SetAnts():
-                ants, self.ants = self._ants(), change.number
-                self._remove(ants[change.number :])
-                self._add_some(max(change.number - len(ants), 0))
+                missing = change.number - len(self._ants())
+                self._remove(self._ants()[change.number :])
+                self._add_some(max(missing, 0))
             case language.Place(what="queen"):
                 self._move_queen(cells[0], change.nest or 0)
             case language.Place():
@@ -126,7 +115,7 @@ class Interventions:
         return int(change.share * len(self._ants(change.nest)) + 0.5)
 
     def _put(self, cells: Sequence[Cell], what: int, kind: int = 0, loads: int = 1) -> None:
-        """Make cells EMPTY, OBSTACLE or FOOD, now and later, except those of ants and queens."""
+        """Make cells EMPTY, OBSTACLE or FOOD, except those of ants and queens."""
         world = self.colony.world
         self._move_aside(cells if what != EMPTY else ())
         for cell in cells:
@@ -134,11 +123,10 @@ class Interventions:
                 continue
             world.ground[cell] = what
             if what == FOOD:
-                self._foods[cell] = kind
                 world.put_food(cell, kind, loads)
                 self.colony.food_sources.put(cell, kind)
             else:
-                self._end_food(cell)
+                self.colony.food_sources.end(cell)
         world.take(self.colony.task, self.colony.learns)  # rocks have no trail
 
     def _move_aside(self, cells: Sequence[Cell]) -> None:
@@ -154,7 +142,7 @@ class Interventions:
                     ant.cell = there
 
     def _move(self, cell: Cell, to: Cell) -> None:
-        """Move rock, food or the queen to an empty cell, now and later; ants move aside."""
+        """Move rock, food or the queen to an empty cell; ants move aside."""
         world = self.colony.world
         what = world.ground[cell]
         if what == EMPTY or world.ground[to] != EMPTY:
@@ -167,40 +155,33 @@ class Interventions:
             self._put([to], what, world.kinds.get(cell, 0), world.loads.get(cell, 1))
 
     def _move_queen(self, cell: Cell, nest: int) -> None:
-        """Move a queen to an empty cell, now and later; an ant there moves aside."""
+        """Move a queen to an empty cell; an ant there moves aside."""
         world = self.colony.world
         self._move_aside([cell])
         assert world.content(cell) == EMPTY
         old, world.queens[nest] = world.queens[nest], cell
         world.ground[old], world.ground[cell] = EMPTY, QUEEN
-        self._end_food(cell)
-
-    def _end_food(self, cell: Cell) -> None:
-        """Let a cell have no food now and later."""
-        self._foods.pop(cell, None)
         self.colony.food_sources.end(cell)
 
-    def _add(self, cells: Sequence[Cell], nests: Sequence[int], heading: int | None) -> None:
-        """Put ants on those of the cells that are empty; draw each heading if none is given."""
+    def _add(self, cells: Sequence[Cell], nests: Sequence[int]) -> None:
+        """Put ants on those of the cells that are empty."""
         colony = self.colony
         pairs = zip(cells, nests, strict=True)
         free = [(cell, nest) for cell, nest in pairs if colony.world.content(cell) == EMPTY]
-        headings = [heading or 0 for _ in free]
-        if heading is None:
-            headings = [pick(self._stream.draw()[0], N_HEADINGS) for _ in free]
+        headings = [pick(self._stream.draw()[0], N_HEADINGS) for _ in free]
         castes = [
             draw_caste(colony.castes, nest, colony.starting[nest], self._stream) for _, nest in free
         ]
-        for (cell, nest), towards, caste in zip(free, headings, castes, strict=True):
+        for (cell, nest), heading, caste in zip(free, headings, castes, strict=True):
             slot = next(slot for slot in range(colony.slots) if slot not in colony.ants)
-            colony.new_ant(cell, towards, slot, nest, caste)
+            colony.new_ant(cell, heading, slot, nest, caste)
 
-    def _add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> None:
+    def _add_some(self, n: int, nest: int | None = None) -> None:
         """Put n ants on free cells, in the order of `ants.starts`; without a nest, by turns."""
         colony, world = self.colony, self.colony.world
         by_turns = range(len(world.queens)) if nest is None else [nest]
         orders = {
-            number: start_order(self._first, world.queens[number], colony.seed, colony.start)
+            number: start_order(colony.start_world, world.queens[number], colony.seed, colony.start)
             for number in by_turns
         }
         cells: list[Cell] = []
@@ -208,28 +189,66 @@ class Interventions:
         for number in nests:
             free = (cell for cell in orders[number] if world.content(cell) == EMPTY)
             cells.append(next(cell for cell in free if cell not in cells))
-        self._add(cells, nests, heading)
+        self._add(cells, nests)
 
     def _remove(self, ants: Iterable[Ant]) -> None:
         """Remove ants with their food."""
         for ant in ants:
             del self.colony.ants[ant.slot], self.colony.world.ants[ant.cell]
 
-    def _begin_episode(self) -> None:
-        """End the episode, and start the next one in the world as interventions have changed it."""
-        colony, first = self.colony, self._first
+
+class Protocol:
+    """Events in each episode of a colony.
+
+    Each episode begins without the interventions of the one before. Call `before_tick` before each
+    tick.
+    """
+
+    def __init__(self, colony: ReferenceColony, events: Sequence[ProtocolEvent]) -> None:
+        self._colony, self._events = colony, events
+
+    def run(self, episodes: int, ticks: int) -> list[EpisodeRecord]:
+        """Return the records of whole episodes."""
+        for _ in range(episodes):
+            self.begin_episode()
+            while self._colony.record.ticks < ticks and not self._colony.over:
+                self.before_tick()
+                self._colony.tick(last=self._colony.record.ticks == ticks - 1)
+            self.end_episode()
+        return self._colony.records[-episodes:]
+
+    def begin_episode(self) -> None:
+        """Begin an episode of the colony."""
+        colony = self._colony
+        colony.begin_episode()
+        self._happened: set[int] = set()
+        self._interventions = Interventions(colony)
+        self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
+
+    def end_episode(self) -> None:
+        """Undo changes of numbers, and end the episode."""
+        colony = self._colony
+        colony.task, colony.training, colony.epsilon, colony.learning_rate = self._before
         colony.end_episode()
-        colony.n_ants = self.ants
-        for number in range(len(colony.streams), self.ants):
-            colony.streams.append(RandomStream(stream_state(colony.seed, STREAM_ANT, number)))
-        queens = colony.world.queens
-        rocks = [cell for cell, what in colony.world.ground.items() if what == OBSTACLE]
-        trails = [(tuple(row[:3]), row[3]) for row in first.trails.tolist()]
-        trails = [(cell, level) for cell, level in trails if cell not in rocks]
-        ants = [(tuple(row[:3]), row[3]) for row in first.ants.tolist()]
-        ants = [row for row in ants if row[0] not in {*queens, *rocks, *self._foods}]
-        foods = [*self._foods.items()]
-        colony.begin_episode(
-            World(first.ranges, queens, foods, rocks, trails, ants, regions=first.regions)
-        )
-        self._set_stream()
+
+    def before_tick(self) -> None:
+        """Let all events of the present tick happen."""
+        for number, event in enumerate(self._events):
+            if self._happens(number, event):
+                self._happened.add(number)
+                for intervention in event.interventions:
+                    self._interventions.apply(intervention)
+
+    def _happens(self, number: int, event: ProtocolEvent) -> bool:
+        tick = self._colony.record.ticks
+        if isinstance(event, At):
+            return tick == event.tick
+        if isinstance(event, Every):
+            start = event.ticks if event.start is None else event.start
+            stop = tick if event.stop is None else event.stop
+            return start <= tick <= stop and (tick - start) % event.ticks == 0
+        assert isinstance(event, When)
+        if tick == 0 or tick % event.interval or (event.once and number in self._happened):
+            return False
+        value = measured(self._colony, event.measure)
+        return value > event.above if event.above is not None else value < event.below  # type: ignore[operator]

@@ -24,17 +24,10 @@ class ReferenceLearner:
 
     A simple learner overrides `next_value`; a learner with a memory also overrides `learn`, and
     `begin_run` or `begin`.
-
-    Attributes:
-        draws_next_action: Whether the next action is drawn before the update, as in SARSA.
-        hyperparameters: The settings that only this learner has, with their defaults.
-        rows: The table, n_states lists of 5 np.float32, which are faster here than an array.
-        model: For learners that plan, the last transition of each visited pair, in the order of
-            first visits.
     """
 
-    draws_next_action = False
-    hyperparameters: ClassVar[Mapping[str, float]] = {}
+    draws_next_action = False  # before the update, as in SARSA
+    hyperparameters: ClassVar[Mapping[str, float]] = {}  # its own settings, with their defaults
 
     def __init__(
         self, config: TrainingConfig, n_states: int, q_values: np.ndarray | None = None
@@ -45,8 +38,9 @@ class ReferenceLearner:
         self.discount = np.float32(config.discount)
         if q_values is None:
             q_values = np.full((n_states, N_ACTIONS), config.initial_q)
+        # Lists of 5 np.float32 are faster here than an array.
         self.rows = [list(row) for row in np.asarray(q_values, np.float32)]
-        self.model: dict[Pair, Transition] = {}
+        self.model: dict[Pair, Transition] = {}  # the last of each pair, in order of first visits
         self.begin_run()
         self.begin()
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Container
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from taichi_ants.reference.ants import Ant
+from taichi_ants.reference.choice import ways
 from taichi_ants.reference.features import inputs_of
 from taichi_ants.reference.geometry import distance
 from taichi_ants.reference.observations import (
@@ -16,7 +17,6 @@ from taichi_ants.reference.observations import (
     ants_in_view,
     cells_in_view,
     codes_seen,
-    is_better,
     levels_in_view,
     more_cells,
     nestmate,
@@ -24,12 +24,9 @@ from taichi_ants.reference.observations import (
 )
 from taichi_ants.reference.random_stream import WORDS
 from taichi_ants.reference.world_state import Trail, WorldState, computed
+from taichi_ants.rules import Rule
 from taichi_ants.rules.inputs import Vector
-from taichi_ants.task.constants import SEES_CUE, SEES_EMPTY
-
-if TYPE_CHECKING:
-    from taichi_ants.rules import Rule
-    from taichi_ants.task import Observation, Task
+from taichi_ants.task import Observation, Task
 
 
 def choose_by_rule(
@@ -41,13 +38,7 @@ def choose_by_rule(
     high, low = ant.stream.draw()
     seen = ant.state if task.observation == "paper" else ant.paper_state
     codes = [seen >> 4 & 3, seen >> 2 & 3, seen & 3]
-    is_open = [code in (SEES_EMPTY, SEES_CUE) for code in codes]
-    nearer = [code == SEES_CUE and world.has_compass(ant) for code in codes]
-    for side, cell in enumerate(cells_in_view(ant)):
-        if cell in world.ants and side - 1 not in ant.misread:
-            nearer[side] = world.has_compass(ant) and is_better(world, ant, cell)
-            if task.traffic.shared and nestmate(world, ant, cell):
-                is_open[side] = ant.carries or task.traffic.follow
+    is_open, nearer = ways(world, ant, codes, task.traffic)
     inputs: dict[str, Any] = {"values": list(values), "codes": codes, "is_open": is_open}
     inputs |= {"nearer": nearer, "paper_state": seen, "epsilon": int(epsilon * WORDS) / WORDS}
     inputs |= {"random": low / WORDS, "random_2": high / WORDS}

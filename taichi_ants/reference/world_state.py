@@ -6,7 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,14 +20,11 @@ from taichi_ants.reference.geometry import (
     neighbour,
     queens_of,
 )
+from taichi_ants.rules import Parameters, Rule
 from taichi_ants.rules.inputs import Vector
-from taichi_ants.task import Caste
+from taichi_ants.task import Caste, Pheromone, Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
-
-if TYPE_CHECKING:
-    from taichi_ants.rules import Parameters, Rule
-    from taichi_ants.task import Pheromone, Task
-    from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import World
 
 Level = int | np.integer | np.float32
 
@@ -122,23 +119,15 @@ class Trail:
 
 
 class WorldState:
-    """The state of a world in an episode.
-
-    Attributes:
-        ground: The content of each cell: EMPTY, OBSTACLE, FOOD or QUEEN; EMPTY under ants.
-        kinds, loads: The kind of the food in a cell, and its loads.
-        ants: The ants by their cells.
-        pheromones: The trail and the further fields, by name.
-        cues: The names of the outbound and the homing cue, by caste.
-        foods: The kinds of food of the task; none for the usual food.
-        of_nests: The values of the features of the model by name, at first 0, for each nest.
-    """
+    """The state of a world in an episode."""
 
     def __init__(self, world: World, task: Task, learns: bool = False) -> None:
         self._ranges = world.ranges
         self.queens: list[Cell] = queens_of(world)
+        # The values of the features of the model by name, for each nest.
         self.of_nests: list[dict[str, Any]] = [defaultdict(float) for _ in self.queens]
         self.ants: dict[Cell, Ant] = {}
+        # The content of each cell: EMPTY (also under ants), OBSTACLE, FOOD or QUEEN.
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(world.ranges), EMPTY)
         self.ground |= dict.fromkeys(self.queens, QUEEN)
         self.ground |= dict.fromkeys(listed_cells(world.foods), FOOD)
@@ -151,8 +140,8 @@ class WorldState:
 
     def take(self, task: Task, learns: bool) -> None:
         """Take the numbers of a task, and present rocks; pheromones keep their levels."""
-        self.foods = list(task.foods.values())
-        self.cues = [
+        self.foods = list(task.foods.values())  # none for the usual food
+        self.cues = [  # the outbound and the homing cue of each caste
             (caste.outbound_cue or task.outbound_cue, caste.homing_cue or task.homing_cue)
             for caste in task.castes.values() or [Caste()]
         ]

@@ -64,9 +64,9 @@ def field_ramp(number: int) -> np.ndarray:
 
 # The colours of nests, for the queen and her ants, and of kinds of food, by number.
 _NESTS = (0x83000F, 0x76583D, 0x610854, 0x0625AA, 0x808002, 0x63686D)
-_FOODS = (CELL_FOOD, 0x810508, 0x6B904C, 0xEBC01C, 0x5D4135, 0x3E5C83, 0x181100, 0xDD9297)
+_FOODS = (0x810508, 0x6B904C, 0xEBC01C, 0x5D4135, 0x3E5C83, 0x181100, 0xDD9297)
 QUEENS, ANTS = (np.array([first, *_NESTS], np.uint32) for first in (CELL_QUEEN, ANT))
-FOODS = np.array(_FOODS, np.uint32)
+FOODS = np.array([CELL_FOOD, *_FOODS], np.uint32)
 # Their light backgrounds.
 QUEEN_FLOORS, FOOD_FLOORS = (
     np.append(first, packed(np.rint(0.85 * channels(PAGE) + 0.15 * channels(several[1:]))))

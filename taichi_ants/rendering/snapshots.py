@@ -30,12 +30,10 @@ CaptionedSnapshot = tuple[Snapshot, Status]
 def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
     """Return a world with n ants, or none, at the start; raises as `World.start` does."""
     cells, headings = world.start(seed, n) if n else np.zeros((2, 0), np.int32)
-    kinds = np.zeros(world.grid.size, np.uint8)
-    kinds[world.grid.index(world.foods[: len(world.food_kinds)])] = world.food_kinds
     return Snapshot(
         *(world.grid, world.ground(), world.trail_levels(), cells, headings),
         ant_carries=np.zeros(len(cells), dtype=bool),
-        food_kinds=kinds,
+        food_kinds=world.kinds_by_cell(),
         queens=world.grid.index(world.queens).astype(np.int32),
         world=world,
     )
@@ -94,9 +92,9 @@ class Episode:
             if step:
                 colony.tick()
             lines = [("episode", self.name), ("step", str(step)), ("return", str(gained))]
-            last = [] if action is None else [("action", ACTION_NAMES[action])]
-            if action is None and self.delivered:
-                last = [("outcome", "delivered")]
+            last = [("outcome", "delivered")] if self.delivered else []
+            if action is not None:
+                last = [("action", ACTION_NAMES[action])]
             q_values = colony.q_values[0, state]
             status = _status_of(sees, state, q_values, action, trace.q_values, lines, last)
             yield colony.snapshot(), status

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
 from taichi_ants.rules.rule import RULES
 from taichi_ants.settings import DeclaredSetting, Named, Settings, all_of, declared, flat
-from taichi_ants.studies.folder import INPUTS, asked_in, checksum_of
+from taichi_ants.studies.folder import asked_in
 from taichi_ants.studies.sweep_file import declaration_of
 from taichi_ants.task import Task, observations
 
@@ -134,13 +134,12 @@ class Model:
         path = re.escape(f"task.{feature.group}.")
         if feature.switch:
             path = rf"({path}|task\.castes\.\w+\.){feature.switch}$"
-        of_group = [
-            (value, self.declaration(name, row))
-            for row in self.rows
-            for name, value in row.items()
-            if re.match(path, name)
-        ]
-        return any(setting is None or value != setting.default for value, setting in of_group)
+        for row in self.rows:
+            for name in filter(re.compile(path).match, row):
+                setting = self.declaration(name, row)
+                if setting is None or row[name] != setting.default:
+                    return True
+        return False
 
     def parameters(self) -> list[Row]:
         """Return the names, values, units and meanings of all settings that have an effect."""
@@ -178,28 +177,23 @@ class Model:
     def sentences(self, path: str, cls: type[Settings]) -> Iterator[str]:
         """Yield the sentences that hold for the settings of a group, at some of the points."""
         defaults = {setting.path: setting.default for setting in all_of(cls)}
-        for key, text in cls.sentences.items():
-            name, _, value = key.partition("=")
+        for key, sentence in cls.sentences.items():
+            name, _, wanted = key.partition("=")
             values = self.values(f"{path}.{name}") if name else [True]
             default = defaults.get(f"{cls.path}.{name}")
-            holds = [_value(v) == value if value else v != default for v in values]
-            own = {name: _several(v for v, is_true in zip(values, holds, strict=True) if is_true)}
-
-            def words(match: re.Match[str], path: str = path, own: dict[str, str] = own) -> str:
-                return own.get(match[1]) or self.words_of(f"{path}.{match[1]}")
-
-            if any(holds):
-                said = re.sub(r"\{([\w.]+)\}", words, text)
-                yield said if all(holds) else f"In some of the points: {said}"
+            said = [v for v in values if (in_words(v) == wanted if wanted else v != default)]
+            for other in re.findall(r"\{([\w.]+)\}", sentence):
+                shown = said if other == name else self.values(f"{path}.{other}")
+                shown = [value for value in shown if value is not None] or [None]
+                sentence = sentence.replace(f"{{{other}}}", _several(shown))
+            if said:
+                everywhere = len(said) == len(values)
+                yield sentence if everywhere else f"In some of the points: {sentence}"
 
     def values(self, name: str) -> list[Any]:
         """Return the values of a setting at the points in which it has an effect."""
         rows = [row for row in self.rows if name in row]
         return [row[name] for row in rows if self.uses(row, name, self.declaration(name, row))]
-
-    def words_of(self, name: str) -> str:
-        """Return the values of a setting in words."""
-        return _several([value for value in self.values(name) if value is not None] or [None])
 
     def submodels(self) -> Iterator[str]:
         """Yield a paragraph on each group of settings, and on each rule that the author wrote."""
@@ -232,78 +226,39 @@ class Model:
         summaries = [(n, observations.get(n).summary) for n in known if n in observations.names()]
         return " ".join(f"Observation `{name}`: {summary}." for name, summary in summaries)
 
-    def schedule(self) -> str:
-        """Return the steps of a tick, in order."""
-        rules, ants, food = (
-            {value for row in self.rows for name, value in row.items() if re.search(end, name)}
-            for end in (
-                r"\.evaporation$",
-                r"\.(births|lifespan)$",
-                r"\.(regrowth|pile_move_interval)$",
-            )
-        )
-        steps = {
-            "Ants choose actions": True,
-            "of the ants that want one cell or food item, one wins": self.of_colony,
-            "ants act, get their rewards, and deposit": True,
-            "pheromones evaporate and spread": rules - {"none"},
-            "ants are born and die": ants - {None, False},
-            "food grows back, and piles move": food - {None},
-            "ants observe": True,
-            "ants learn": any(row["episodes"] for row in self.rows),
-        }
-        listed = "; ".join(step for step, is_there in steps.items() if is_there)
-        return f"{listed}. All ants finish a step before the next one begins."
-
     def entries(self, group: str) -> list[str]:
         """Return the names of the entries of a named group of the task, such as its fields."""
         parts = [name.split(".") for name in self.rows[0]]
         return list(dict.fromkeys(part[2] for part in parts if part[:2] == ["task", group]))
 
-    def entities(self) -> list[Row]:
-        """Return the kinds of entities with their numbers in a world."""
-        ranges = (world["ranges"] for world in self.places)
-        cells = {x * y + y * z + z * x - x - y - z + 1 for x, y, z in ranges}
-        several = {
-            "castes of ants": self.entries("castes"),
-            "kinds of food": self.entries("foods"),
-            "further pheromones": self.entries("fields"),
-        }
-        return [
-            ("cells", _several(sorted(cells))),
-            ("nests, each with a queen", _several(sorted({*map(_nests, self.places)}))),
-            ("ants at the start", _several([row.get("ants", 1) for row in self.rows])),
-            *((words, f"{len(n)}: {', '.join(n)}") for words, n in several.items() if n),
-        ]
-
     def state_variables(self) -> list[Row]:
         """Return the state variables: entity, name, values and unit."""
-        text = {name.strip("`"): value for name, value, *_ in self.parameters()}
         names = {row["task.observation"] for row in self.rows} & {*observations.names()}
         states = sorted(observations.get(name).n_states for name in names)
-        number, foods, castes = "at least 0", self.entries("foods"), self.entries("castes")
-        levels = ["trail", *self.entries("fields")]
-        of_features = {
-            (array.per, array.words, array.values, array.unit): self.uses_feature(feature)
-            for feature in FEATURES
-            for array in feature.arrays
-            if array.words
-        }
+        number, castes = "at least 0", self.entries("castes")
         rows = {
             ("cell", "content", "empty, rock, food, queen", ""): True,
-            **{("cell", f"level of `{level}`", number, "level"): True for level in levels},
-            ("cell", "food", number, "loads"): foods,
+            **{
+                ("cell", f"level of `{field}`", number, "level"): True
+                for field in ("trail", *self.entries("fields"))
+            },
+            ("cell", "food", number, "loads"): self.entries("foods"),
             ("nest", "food received", number, "items"): True,
             ("ant", "cell", "", ""): True,
             ("ant", "heading", "0 to 5, clockwise; 0 is up", "60 degrees"): True,
             ("ant", "has food", "yes, no", ""): True,
             ("ant", "observation", f"one of {_several(states)} states", ""): states,
             ("ant", "caste", ", ".join(castes), ""): castes,
-            **of_features,
+            **{
+                (array.per, array.words, array.values, array.unit): self.uses_feature(feature)
+                for feature in FEATURES
+                for array in feature.arrays
+                if array.words
+            },
             ("ant", "time since its load changed", number, "ticks"): any(
-                name.endswith(".slope") for name in text
+                self.values(name) for name in self.rows[0] if name.endswith(".slope")
             ),
-            ("learner", "action values Q(s, a)", "", "reward"): "training.learner" in text,
+            ("learner", "action values Q(s, a)", "", "reward"): self.values("training.learner"),
         }
         return [row for row, is_used in rows.items() if is_used]
 
@@ -321,46 +276,38 @@ class Model:
 def odd_of(folder: Path, manifest: Mapping[str, Any]) -> str:
     """Return the ODD description of finished results, as Markdown."""
     asked = asked_in(folder)
-    inputs = asked["inputs"]
-    name = inputs.get(str(asked["options"].get("file")))
+    name = asked["inputs"].get(str(asked["options"].get("file")))
     sweep = files.tomllib.loads(files.read_text(folder / name)) if name else {}
-    every = sorted(path for path in (folder / INPUTS).rglob("*") if path.is_file())
-    sources = [
-        (f"`{path.relative_to(folder).as_posix()}`", f"`{checksum_of(path)[:16]}`")
-        for path in every
-    ]
-    return described(Model(asked["settings"], sweep), manifest["command"], sources)
+    return described(Model(asked["settings"], sweep), manifest["command"])
 
 
-def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
-    """Return the ODD description of a model; `sources` are input files and their checksums."""
+def described(model: Model, command: str) -> str:
+    """Return the ODD description of the model of a study, which a command has run."""
     rows, heads = model.parameters(), ("Parameter", "Value", "Unit", "Meaning")
     sizes = ("ranges", "foods", "obstacles", "trails", "ants")
     worlds = [
-        (*(str(world[size]) for size in sizes), str(_nests(world)), f"`{world['sha256'][:16]}`")
+        (
+            *(str(world[size]) for size in sizes),
+            str(len(world.get("queens", "Q"))),
+            f"`{world['sha256'][:16]}`",
+        )
         for world in model.places[:_MOST]
     ]
     of_worlds = ("Ranges", "Food items", "Rock", "Trail cells", "Listed ants", "Nests", "SHA-256")
+    variables = ("Entity", "State variable", "Values", "Unit")
     parts = {
         "command": command,
-        "entities": _table(("Entity", "Number in a world"), model.entities()),
-        "state_variables": _table(
-            ("Entity", "State variable", "Values", "Unit"), model.state_variables()
-        ),
-        "schedule": model.schedule(),
+        "state_variables": _table(variables, model.state_variables()),
         "learning": model.learning(),
         "sensing": model.sensing(),
         "submodels": "\n\n".join(model.submodels()),
         "seeds": ", ".join(map(str, model.settings["seeds"])),
         "measures": _table(("Measure", "Meaning"), model.measures()),
         "worlds": _table(of_worlds, worlds),
-        "more_worlds": f"{len(model.places)} worlds; the manifest has all."
-        if model.places[_MOST:]
-        else "",
+        "number": len(model.places),
         "events": _table(("Event", *heads[1:]), [row for row in rows if _EVENT.match(row[0])])
         or "Nothing from outside changes the model while it runs.",
         "parameters": _table(heads, [row for row in rows if not _EVENT.match(row[0])]),
-        "sources": _table(("File", "SHA-256 begins"), sources),
     }
     text = resources.files(__package__).joinpath("odd.md").read_text("utf-8").format(**parts)
     return re.sub("\n{3,}", "\n\n", text).rstrip() + "\n"
@@ -372,23 +319,20 @@ def _table(heads: Row, rows: Iterable[Row]) -> str:
     return Table("", heads, cells, text_columns=len(heads)).markdown().rstrip()
 
 
-def _nests(world: Mapping[str, Any]) -> int:
-    return len(world.get("queens", "Q"))
-
-
 def _list_of(value: Any) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
 
 def _several(values: Iterable[Any]) -> str:
     """Return values, each once, or their range if they are many numbers."""
-    values = list({_value(value): value for value in values}.values())
+    values = list({in_words(value): value for value in values}.values())
     if len(values) > _MOST and all(type(value) in (int, float) for value in values):
-        return f"{len(values)} values from {_value(min(values))} to {_value(max(values))}"
-    return ", ".join(map(_value, values))
+        return f"{len(values)} values from {in_words(min(values))} to {in_words(max(values))}"
+    return ", ".join(map(in_words, values))
 
 
-def _value(value: Any) -> str:
+def in_words(value: Any) -> str:
+    """Return the value of a setting as text."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return "off" if value is None else f"{value:.15g}" if type(value) is float else str(value)

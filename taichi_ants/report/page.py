@@ -1,4 +1,4 @@
-"""The common parts of the report pages: templates, players, drawings of intervals, and tables."""
+"""The common parts of the report pages: templates, players, and tables."""
 
 from __future__ import annotations
 
@@ -7,28 +7,21 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
-from html import escape
 from pathlib import Path
-from textwrap import wrap
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from taichi_ants.analysis.findings import Finding, Verdict
-from taichi_ants.analysis.tables import figure, number
-from taichi_ants.errors import count
-from taichi_ants.viewer.frames import Recording
-from taichi_ants.viewer.page import content_policy, part
+from taichi_ants.analysis.tables import number
+from taichi_ants.report.odd import in_words
+from taichi_ants.viewer.page import Recording, content_policy, part
 
 _HERE = "taichi_ants.report"
 # Scripts of the viewer: the data of a recording, the picture of the world, and the playback.
 _PLAYING = ("history.js", "stage.js", "timeline.js")
 
-# Sizes of drawings of intervals.
-WIDTH, _MIDDLE, _NUMBERS, _LINE = 340.0, 15.0, 39.0, 15.0
-_SIDE = 26.0  # space for a number
 _SHOWN_PACKAGES = ("taichi_ants", "taichi", "numpy", "scipy", "matplotlib")
-_LETTERS = 58  # characters of a line as wide as the drawing
 
 
 def signed(text: Any) -> Any:
@@ -106,11 +99,6 @@ class Shown(NamedTuple):
             words += f". With the mean instead of the IQM, {by_mean.verdict.value}: {told}"
         return words
 
-    @property
-    def drawing(self) -> str:
-        """The interval as a picture (SVG)."""
-        return interval_drawing(*self[1:])
-
 
 def _measured(finding: Finding, label: str, unit: str) -> str:
     if finding.verdict is Verdict.NOT_TESTED:
@@ -120,56 +108,6 @@ def _measured(finding: Finding, label: str, unit: str) -> str:
     known = math.isfinite(finding.low) and math.isfinite(finding.high)
     ends = f"between {low} and {high}" if known else "without an interval"
     return f"{label}: {f'{effect} {unit}'.rstrip()}, {ends}"
-
-
-def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
-    """Return a finding as an SVG element, empty without numbers; `label` and `unit` name the axis.
-
-    The line is the interval and the dot is the effect. One band is the range that the criterion
-    requires, the other one the differences that are too small to matter, as in `Criterion.judge`.
-    """
-    if finding.verdict is Verdict.NOT_TESTED or not math.isfinite(finding.low + finding.high):
-        return ""
-    criterion, contrast = finding.contrast.criterion, finding.contrast
-    margin, wanted = criterion.margin, (criterion.low, criterion.high)
-    estimator = "IQM" if contrast.uses_iqm else "mean"
-    axis = f"{label}{f' ({unit})' if unit else ''}, {estimator} of {count(contrast.seeds, 'seed')}"
-    edges = [*wanted, *(() if margin is None else (-margin, margin))]
-    shown = [finding.low, finding.high, *filter(math.isfinite, edges)]
-    room = 0.06 * (max(shown) - min(shown)) or 1.0
-    left, right = min(shown) - room, max(shown) + room
-
-    def at(value: float) -> float:
-        share = (min(max(value, left), right) - left) / (right - left)
-        return round(_SIDE + share * (WIDTH - 2 * _SIDE), 1)
-
-    def band(low: float, high: float, kind: str) -> str:
-        size = f'x="{at(low)}" width="{at(high) - at(low):.1f}" y="{_MIDDLE - 9}" height="18"'
-        return f'<rect class="{kind}" {size}/>'
-
-    def text(words: str, x: float, y: float) -> str:
-        return f'<text x="{x:g}" y="{y:g}">{escape(words)}</text>'
-
-    low, high = at(finding.low), at(finding.high)
-    ends = sorted({edge for edge in edges if math.isfinite(edge)})
-    parts = [
-        band(*wanted, "wanted"),
-        band(-margin, margin, "small") if margin else "",
-        *(f'<path class="edge" d="M{at(edge)} {_MIDDLE - 9}v18"/>' for edge in ends),
-        f'<path class="span" d="M{low} {_MIDDLE}H{high}"/>',
-        f'<circle cx="{at(finding.effect)}" cy="{_MIDDLE}" r="4.5"/>',
-    ]
-    labelled: list[float] = []
-    for tick in sorted(ends, key=lambda edge: (edge != 0, edge)):
-        if all(abs(at(tick) - at(other)) > _SIDE for other in labelled):
-            labelled.append(tick)
-            parts.append(text(figure(tick).replace("-", "\N{MINUS SIGN}"), at(tick), _NUMBERS))
-    lines = wrap(axis, _LETTERS)
-    for n, line in enumerate(lines, start=1):
-        parts.append(text(line, WIDTH / 2, _NUMBERS + _LINE * n))
-    height = _NUMBERS + _LINE * len(lines) + 5.0
-    size = f'viewBox="0 0 {WIDTH:g} {height:g}" width="{WIDTH:g}" height="{height:g}"'
-    return f'<svg class="interval" {size} aria-hidden="true">{"".join(parts)}</svg>'
 
 
 class Statement(NamedTuple):
@@ -187,10 +125,7 @@ class Statement(NamedTuple):
 
 
 # In the order of the tallies on the page.
-KINDS = (
-    *(Verdict.SUPPORTED, Verdict.EQUIVALENT, Verdict.UNDECIDED),
-    *(Verdict.CONTRADICTED, Verdict.NOT_TESTED, Verdict.TOO_FEW),
-)
+_ORDER = "supported", "equivalent", "undecided", "contradicted", "not tested", "too few seeds"
 
 
 class Statements(NamedTuple):
@@ -202,8 +137,8 @@ class Statements(NamedTuple):
 
     @property
     def kinds(self) -> list[Verdict]:
-        """The verdicts that occur, in the order of `KINDS`."""
-        return [kind for kind in KINDS if any(kind in line.verdicts for line in self.lines)]
+        """The verdicts that occur, in order."""
+        return sorted({kind for line in self.lines for kind in line.verdicts}, key=_ORDER.index)
 
     @property
     def tallies(self) -> list[tuple[str, list[tuple[Verdict, int]]]]:
@@ -225,16 +160,10 @@ def setting_facts(settings: Mapping[str, Any]) -> dict[str, str]:
         if name == "seeds" and entries[1:]:
             facts["Seeds"] = f"{entries[0]} to {entries[-1]}"
         elif name not in ("version", "worlds", "world", "pool", "after"):
-            values = sorted(set(entries)) if numbers else dict.fromkeys(map(_plain, entries))
+            values = sorted(set(entries)) if numbers else dict.fromkeys(map(in_words, entries))
             words = name.split(".", 1)[-1].replace("_", " ").replace(".", ", ")
             facts[words.capitalize()] = ", ".join(map(str, values))
     return {name: words for name, words in facts.items() if words}
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def made_facts(made: Mapping[str, Any]) -> dict[str, str]:

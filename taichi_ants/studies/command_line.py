@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.errors import AntsError, without_middle
-from taichi_ants.settings import DeclaredSetting, Named, Settings, declared, nested
+from taichi_ants.settings import Named, Settings, declared, nested
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
 if TYPE_CHECKING:
@@ -33,10 +33,11 @@ class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
     """A formatter that shows defaults, except None, flags and empty lists."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        silent = action.default in (None, []) or isinstance(action.default, bool)
-        if isinstance(action.default, (list, tuple)) and not silent:
-            return f"{action.help} (default: {' '.join(map(str, action.default))})"
-        return action.help if silent else super()._get_help_string(action)
+        default = action.default
+        if isinstance(default, (list, tuple)) and default:
+            return f"{action.help} (default: {' '.join(map(str, default))})"
+        is_silent = isinstance(default, bool) or default in (None, [])
+        return action.help if is_silent else super()._get_help_string(action)
 
 
 class _OneOrList(argparse.Action):
@@ -54,7 +55,6 @@ class Parser(argparse.ArgumentParser):
     """
 
     open_settings: tuple[str, ...] = ()  # for example "world": accept any option --world.SETTING
-    named_groups: tuple[str, ...] = ()  # for example "task.fields": accept --task.fields.NAME.level
     own_settings: Container[str] = ()  # full names of settings that the command determines itself
     program: str | None = None  # the name in --help; None: the name of the script
 
@@ -77,25 +77,14 @@ class Parser(argparse.ArgumentParser):
             if word == "" or (word.startswith("--") and word.endswith("=")):
                 name = word[:-1] or f"the argument after {before!r}"
                 self.error(f"{name} is empty; give a value or leave it out")
-            self._add_setting(word.partition("=")[0])
+            flag = word.partition("=")[0]
+            path = flag[2:].replace("-", "_")
+            if path in self.own_settings:
+                self.error(f"this command sets {flag} itself; leave it out")
+            is_open = "." in path and path.partition(".")[0] in self.open_settings
+            if is_open and flag not in self._option_string_actions:  # its value is checked later
+                self.add_argument(flag, dest=path, type=_literal, nargs="*", action=_OneOrList)
         return super().parse_known_args(words, namespace)
-
-    def _add_setting(self, flag: str) -> None:
-        """Accept an option such as --world.piles; the world checks its value."""
-        path = flag[2:].replace("-", "_")
-        if path in self.own_settings:
-            self.error(f"this command sets {flag} itself; leave it out")
-        part, dot, _ = path.partition(".")
-        is_open = dot and part in self.open_settings
-        if flag not in self._option_string_actions and (is_open or self._is_named(path)):
-            self.add_argument(flag, dest=path, type=_literal, nargs="*", action=_OneOrList)
-
-    def _is_named(self, path: str) -> bool:
-        """Return whether a path such as task.fields.home.level leads to a setting of an entry."""
-        return any(
-            path.startswith(f"{group}.") and path.count(".") > group.count(".") + 1
-            for group in self.named_groups
-        )
 
     def error(self, message: str) -> NoReturn:
         text = without_middle(" ".join(message.splitlines())).removeprefix("argument ").rstrip(".")
@@ -182,14 +171,21 @@ def whole_number(least: int | None = None, most: int | None = None) -> Callable[
 
 
 def add_settings(parser: Parser, base: Settings) -> None:
-    """Add an option for each setting except `parser.own_settings`; `base` has the defaults."""
+    """Add an option for each setting except `parser.own_settings`; `base` has the defaults.
+
+    Options of the parameters of rules, fields and castes are accepted by any name.
+    """
     parser.usage = "%(prog)s [options]"  # without the list of options, which is too long
+    parser.open_settings += (base.path,)
     group = parser.add_argument_group(f"{base.path} settings")
     for setting in declared(type(base)):
         value = getattr(base, setting.name)
         if setting.kind is Named:
-            parser.named_groups += (setting.path,)
-            group.description = f"{group.description or ''}{_help_of_entries(setting)}"
+            option = f"--{setting.path.replace('_', '-')}.NAME.SETTING"
+            names = [entry.name.replace("_", "-") for entry in declared(setting.entry)]
+            one_of = ", ".join(names) or "the parameters of the rule"
+            about = f"{option}: {setting.rule.help}; SETTING is one of {one_of}. "
+            group.description = f"{group.description or ''}{about}"
         elif setting.path not in parser.own_settings and (
             setting.has_names or not setting.is_group
         ):
@@ -202,14 +198,6 @@ def add_settings(parser: Parser, base: Settings) -> None:
             group.add_argument(f"--{setting.path.replace('_', '-')}", **how, help=about)
         if setting.is_group:
             add_settings(parser, value)
-
-
-def _help_of_entries(group: DeclaredSetting) -> str:
-    """Return the help of options such as --task.fields.home.level, for any name."""
-    names = ", ".join(setting.name.replace("_", "-") for setting in declared(group.entry))
-    option = f"--{group.path.replace('_', '-')}.NAME.SETTING"
-    settings = f"SETTING is one of {names}" if names else "each rule declares its own"
-    return f"{option}: {group.rule.help}; {settings}. "
 
 
 def _literal(text: str) -> Any:

@@ -1,27 +1,38 @@
-"""Designs: which points of ranges of settings a sweep runs.
+"""Designs: which points of ranges of settings a sweep runs, and the sensitivity indices they give.
 
 A setting of a sweep file has a list of values, or a range: `{ from = 10, to = 99, scale = "log" }`.
-A grid combines all values. SciPy and SALib draw the points of other designs from the unit cube,
-whose shares become values. A point depends only on the design, its seed, and its number.
+A grid combines all values. For other designs, SciPy and SALib draw points of the unit cube from a
+scrambled sequence of Sobol, whose shares become values. A point depends only on the settings that
+vary, the seed of the design, and its number.
+
+The first-order index of Sobol is the share of a measure's variance that a setting makes by itself,
+and the total index adds what it makes together with others.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, imported, shown
+from taichi_ants.analysis.statistics import RANDOM_SEED, all_equal, known_means
+from taichi_ants.analysis.sweeps import short
+from taichi_ants.analysis.tables import Table, interval, number, percent, plain_text
+from taichi_ants.errors import AntsError, imported, shown
+from taichi_ants.settings import Flag, Setting, Settings
 
-GRID, LATIN_HYPERCUBE, SOBOL, RANDOM = DESIGNS = ("grid", "latin_hypercube", "sobol", "random")
-KEYS = ("design", "samples", "design_seed", "sensitivity")
+_DRAWN = ("design", "sobol")  # the condition of the other keys
+# Of the table of indices. The share of the seeds is that of the measure.
+COLUMNS = ("measure", "setting", "first_order", "first_order_low", "first_order_high",
+    "total", "total_low", "total_high", "seed_share")  # fmt: skip
 
 
-class Range(NamedTuple):
+@dataclass(frozen=True)
+class Range:
     """A range of numbers with both ends; `whole` has whole numbers only, as int.
 
     With `log`, equal factors are equally frequent, otherwise equal differences.
@@ -35,141 +46,173 @@ class Range(NamedTuple):
     @classmethod
     def of(cls, name: str, table: Mapping[str, Any], whole: bool) -> Range:
         """Return the range in a table; AntsError, which begins with `name`, if it is not one."""
-        for key in table:
-            check_one_of(f"a key of the range {name}", key, ("from", "to", "scale"))
-        check_one_of(f"{name}.scale", table.get("scale", "linear"), ("linear", "log"))
-        log, kinds = table.get("scale") == "log", (int,) if whole else (int, float)
         ends: Any = table.get("from"), table.get("to")
-        low, high = ends
-        are_numbers = all(type(end) in kinds and abs(end) <= 2**53 for end in ends)
-        if not (are_numbers and low < high and (low > 0 or not log)):
-            kind, above = "whole number" if whole else "number", ", above 0 for the scale log" * log
+        (low, high), scale = ends, table.get("scale", "linear")
+        kinds, log = (int,) if whole else (int, float), scale == "log"
+        fits = all(type(end) in kinds and abs(end) <= 2**53 for end in ends)
+        fits = fits and low < high and (low > 0 or not log) and (log or scale == "linear")
+        if not fits or table.keys() - {"from", "to", "scale"}:
             raise AntsError(
-                f"{name} is from {shown(low)} to {shown(high)}; both must be a {kind}, and the "
-                f"first the smaller one{above}."
+                f"{name} is {shown(dict(table))}; a range has the keys from and to, which are "
+                f"{'whole ' * whole}numbers, the first the smaller one, and perhaps the scale "
+                "linear or, if both are above 0, log."
             )
         return cls(low if whole else float(low), high if whole else float(high), log, whole)
 
-    def at(self, share: float) -> float | int:
-        """Return the value at a share of the range, 0 to 1; whole numbers have equal parts."""
-        margin = 0.5 if self.whole else 0.0
-        low, high = self.low - margin, self.high + margin
-        if self.log:
-            value = math.exp(math.log(low) * (1 - share) + math.log(high) * share)
-        else:
-            value = low * (1 - share) + high * share
-        value = math.floor(value + 0.5) if self.whole else value
-        return min(max(value, self.low), self.high)
+
+Axis = Range | Sequence[Any]  # of a sequence, all values are equally frequent
 
 
-class Choices(NamedTuple):
-    """A list of values that are equally frequent."""
+def value_at(axis: Axis, share: float) -> Any:
+    """Return the value at a share of an axis, 0 to 1; whole numbers of a range have equal parts."""
+    if not isinstance(axis, Range):
+        return axis[min(int(share * len(axis)), len(axis) - 1)]
+    margin = 0.5 if axis.whole else 0.0
+    low, high = axis.low - margin, axis.high + margin
+    if axis.log:
+        value = math.exp(math.log(low) * (1 - share) + math.log(high) * share)
+    else:
+        value = low * (1 - share) + high * share
+    value = math.floor(value + 0.5) if axis.whole else value
+    return min(max(value, axis.low), axis.high)
 
-    choices: tuple[Any, ...]
 
-    def at(self, share: float) -> Any:
-        """Return the value at a share of the list, 0 to 1."""
-        return self.choices[min(int(share * len(self.choices)), len(self.choices) - 1)]
-
-
-Axis = Range | Choices
-
-
-def axes_of(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+def settings_in(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     """Yield the settings in nested tables: full names, with a list of values or a range's table."""
     for name, value in tree.items():
         path = f"{before}.{name}" if before else name
         if isinstance(value, Mapping) and value and not value.keys() & {"from", "to"}:
-            yield from axes_of(value, path)
+            yield from settings_in(value, path)
         else:
             yield path, value if isinstance(value, (Mapping, list)) else [value]
 
 
 def varying(axes: Mapping[str, Axis]) -> dict[str, Axis]:
     """Return the axes that have more than one value."""
-    return {n: a for n, a in axes.items() if isinstance(a, Range) or len(a.choices) > 1}
+    return {n: a for n, a in axes.items() if isinstance(a, Range) or len(a) > 1}
 
 
 @dataclass(frozen=True)
-class Design:
-    """The design of a sweep.
+class Design(Settings):
+    """The design of a sweep: keys of its file.
 
-    Attributes:
-        samples: The number of points. With `sensitivity`, the number of base points, each of which
-            has a point for each setting that varies and two more. None for a grid.
-        sensitivity: Whether points follow the scheme of Saltelli, from which indices are computed.
+    With `sensitivity`, points follow the scheme of Saltelli without second order: `samples` groups
+    of a point for each setting that varies and two more.
     """
 
-    kind: str = GRID
-    samples: int | None = None
-    seed: int = 0
-    sensitivity: bool = False
+    design: Annotated[Literal["grid", "sobol"], Setting()] = "grid"
+    samples: Annotated[int | None, Setting(least=1, most=100_000, only=_DRAWN)] = None
+    design_seed: Annotated[int, Setting(least=0, most=2**63 - 1, only=_DRAWN)] = 0
+    sensitivity: Annotated[Flag, Setting(only=_DRAWN)] = False
 
-    @classmethod
-    def of(cls, file: Mapping[str, Any]) -> Design:
-        """Return the design of a sweep file; AntsError if a key is not allowed."""
-        kind = file.get("design", GRID)
-        check_one_of("design", kind, DESIGNS)
-        if kind == GRID:
-            for key in file.keys() & KEYS[1:]:
-                raise AntsError(f"{key} is for the designs {', '.join(DESIGNS[1:])}; set design.")
-            return cls()
-        samples = checked_whole("samples", file.get("samples"), 1, 100_000)
-        seed = checked_whole("design_seed", file.get("design_seed", 0), 0, 2**63 - 1)
-        sensitivity = checked_flag("sensitivity", file.get("sensitivity", False))
-        if sensitivity:
-            imported("sensitivity = true", "SALib", "sensitivity")
-            if kind != SOBOL or samples < 2 or samples & (samples - 1):
-                raise AntsError(
-                    f"sensitivity = true with the design {kind!r} and samples = {samples}; it "
-                    'requires design = "sobol" and a power of 2, such as 64.'
-                )
-        return cls(kind, samples, seed, sensitivity)
+    @property
+    def is_grid(self) -> bool:
+        """Whether points are all combinations of values."""
+        return self.design == "grid"
+
+    def _faults(self) -> Iterator[str]:
+        if self.samples is None and not self.is_grid:
+            yield "samples is missing; give the number of points of the design."
+        if self.sensitivity and self.samples not in [2**n for n in range(1, 17)]:
+            yield f"sensitivity = true with samples = {self.samples} needs a power of 2, as 64."
 
     def facts(self) -> dict[str, Any]:
-        """Return what determines the points besides the settings; empty for a grid.
-
-        The number of samples belongs to it only if more samples would change the first points.
-        """
-        if self.kind == GRID:
-            return {}
-        fixed = {"samples": self.samples} if self.kind == LATIN_HYPERCUBE else {}
+        """Return what determines the points besides the settings; empty for a grid."""
         more = {"sensitivity": True} if self.sensitivity else {}
-        return {"design": {"design": self.kind, "design_seed": self.seed, **fixed, **more}}
+        own = {"design": self.design, "design_seed": self.design_seed, **more}
+        return {} if self.is_grid else {"design": own}
 
     def rows(self, axes: Mapping[str, Axis]) -> list[dict[str, Any]]:
         """Return the points: a value of each axis by name; AntsError if axes do not suit."""
-        drawn = varying(axes)
-        if self.kind == GRID:
-            lists = []
+        if self.is_grid:
             for name, axis in axes.items():
                 if isinstance(axis, Range):
                     raise AntsError(f"{name} is a range, but a grid needs lists; set design.")
-                lists.append(axis.choices)
+            lists: Any = axes.values()
             return [dict(zip(axes, row, strict=True)) for row in itertools.product(*lists)]
+        drawn = varying(axes)
         if not drawn:
-            raise AntsError(f"[vary] has single values only; the design {self.kind!r} needs more.")
-        fixed = {name: axis.at(0.0) for name, axis in axes.items()}
-        return [
-            fixed | {name: drawn[name].at(share) for name, share in zip(drawn, row, strict=True)}
-            for row in self.shares(len(drawn)).tolist()
-        ]
+            raise AntsError("[vary] has single values only; the design 'sobol' needs more.")
+        rows = []
+        for shares in self.shares(len(drawn)).tolist():
+            share_of = dict(zip(drawn, shares, strict=True))
+            rows.append({n: value_at(axis, share_of.get(n, 0.0)) for n, axis in axes.items()})
+        return rows
 
     def shares(self, dimensions: int) -> np.ndarray:
-        """Return points of the unit cube, float64 (points, dimensions), for other than grids."""
+        """Return points of the unit cube, float64 (points, dimensions), for other than grids.
+
+        Raises:
+            AntsError: `sensitivity` needs SALib, which is not installed.
+        """
+        n: Any = self.samples
+        if self.sensitivity:
+            sobol = imported("sensitivity = true", "SALib.sample.sobol", "sensitivity")
+            how = {"calc_second_order": False, "seed": self.design_seed}
+            return sobol.sample(_problem([*map(str, range(dimensions))]), n, **how)
         from scipy.stats import qmc
 
-        assert self.samples is not None
-        if self.kind == RANDOM:
-            return np.random.default_rng(self.seed).random((self.samples, dimensions))
-        if self.sensitivity:
-            from SALib.sample import sobol
-
-            problem = {"num_vars": dimensions, "bounds": [[0, 1]] * dimensions}
-            problem["names"] = [str(number) for number in range(dimensions)]
-            return sobol.sample(problem, self.samples, calc_second_order=False, seed=self.seed)
-        if self.kind == LATIN_HYPERCUBE:
-            return qmc.LatinHypercube(dimensions, seed=self.seed).random(self.samples)
         # `random` warns unless the number is a power of 2, so the sequence is cut.
-        whole = math.ceil(math.log2(self.samples))
-        return qmc.Sobol(dimensions, seed=self.seed).random_base2(whole)[: self.samples]
+        whole = math.ceil(math.log2(n))
+        return qmc.Sobol(dimensions, seed=self.design_seed).random_base2(whole)[:n]
+
+
+def _problem(names: Sequence[str]) -> dict[str, Any]:
+    """Return the unit cube as SALib takes it."""
+    return {"num_vars": len(names), "names": names, "bounds": [[0, 1]] * len(names)}
+
+
+def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[dict[str, Any]]:
+    """Return the indices of settings as rows with `COLUMNS`, with 95 % intervals from a bootstrap.
+
+    `values` of the measure are float64 (points, seeds), for the points of Saltelli's scheme. Seeds
+    without a value (nan) do not count. The list is empty if a point has no value at all, or all
+    means over seeds are equal.
+    """
+    from SALib.analyze import sobol
+
+    means = known_means(values)
+    if np.isnan(means).any() or all_equal(means[None])[0]:
+        return []
+    how = {"calc_second_order": False, "num_resamples": 1000, "seed": RANDOM_SEED}
+    found, share, rows = sobol.analyze(_problem(names), means, **how), seed_share(values, names), []
+    for n, name in enumerate(names):
+        ends = []
+        for index in ("S1", "ST"):
+            value, half = float(found[index][n]), float(found[f"{index}_conf"][n])
+            ends += [value, value - half, value + half]
+        rows.append(dict(zip(COLUMNS, (measure, name, *ends, share), strict=True)))
+    return rows
+
+
+def seed_share(values: np.ndarray, names: Sequence[str]) -> float:
+    """Return the share of the variance of means over seeds that the seeds make, 0 to 1.
+
+    The change that seeds still make looks like an interaction of all settings. The share is
+    estimated from the points that are drawn independently, the first and the last of each group.
+    What a seed adds to all points alike does not count, because all points have the same seeds.
+    Points at which a seed has no value do not count. Nan for one seed.
+    """
+    step, seeds = len(names) + 2, values.shape[1]
+    drawn = np.concatenate([values[::step], values[step - 1 :: step]])
+    drawn = drawn[~np.isnan(drawn).any(axis=1)]
+    if seeds < 2 or len(drawn) < 2:
+        return float("nan")
+    rest = drawn - drawn.mean(axis=1, keepdims=True) - drawn.mean(axis=0) + drawn.mean()
+    noise = np.square(rest).sum() / ((len(drawn) - 1) * (seeds - 1)) / seeds
+    variance = drawn.mean(axis=1).var(ddof=1)
+    return min(1.0, float(noise / variance)) if variance > 0 else float("nan")
+
+
+def report(rows: Sequence[Mapping[str, Any]], seeds: int) -> str:
+    """Return rows of indices as a table for a terminal, the largest total index first."""
+    measures, names = ([*dict.fromkeys(row[k] for row in rows)] for k in COLUMNS[:2])
+    lines = []
+    for row in sorted(rows, key=lambda row: (measures.index(row["measure"]), -row["total"])):
+        measure, name, *numbers, share = row.values()
+        groups = numbers[:3], numbers[3:]
+        cells = [f"{number(n, 2)} {interval(low, high, 2)}" for n, low, high in groups]
+        lines.append([measure, short(name, names), *cells, percent(share)])
+    headers = ["measure", "setting", "first order", "total", "share of seeds"]
+    notes = [f"Indices of means over {seeds} seeds, whose share is in each total index."]
+    return plain_text([Table("", headers, lines, notes, text_columns=2)], 120)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -45,9 +45,12 @@ _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 DURING = ("evaluation", "training", "both")
 SERIES = "series_"  # begins the names of the series of measures in outcomes
 # Settings that only the points that use them name, so that the blocks of others stay valid.
-_LATER = ("policy", "measures", "measure_every", "evaluation_epsilon")
+_LATER = ("policy", "measures", "measure_every", "evaluation_epsilon", "protocol")
 
 Progress = Callable[[float], None]
+Where = Mapping[str, Any]  # the arguments `threads` and `arch` of `train`
+Seeds = Sequence[int]
+Tables = np.ndarray | None  # of the point `after`, float32 (seeds, n_states, 5)
 Outcome = dict[str, np.ndarray]  # arrays by name
 
 
@@ -67,15 +70,11 @@ class Drawn:
                 settings[declared.name] = declared.checked(settings[declared.name])
         return cls(json.dumps([preset, first, settings, regions or {}], sort_keys=True))
 
+    @lru_cache(1024)  # noqa: B019 - all points of a study can share worlds
     def of(self, seed: int) -> World:
         """Return the world of a seed; AntsError if a setting is not allowed."""
-        return _drawn(self.recipe, seed)
-
-
-@lru_cache(1024)  # because all points of a study can share worlds
-def _drawn(recipe: str, seed: int) -> World:
-    preset, first, settings, regions = json.loads(recipe)
-    return worlds.build(preset, first + seed, **settings).with_regions(regions)
+        preset, first, settings, regions = json.loads(self.recipe)
+        return worlds.build(preset, first + seed, **settings).with_regions(regions)
 
 
 @dataclass(frozen=True)
@@ -84,15 +83,13 @@ class RunPoint:
 
     Outcome: `returns`, `steps` and `deliveries` of training, integer (seeds, episodes);
     `greedy_returns`, `greedy_steps` and `greedy_deliveries` of the rollouts, integer (seeds,
-    rollouts). With training also `q_values`, float32 (seeds, n_states, 5).
+    rollouts). With training also `q_values`, float32 (seeds, n_states, 5). Raises AntsError if a
+    value is not allowed.
 
     Attributes:
         episodes: The number of training episodes; 0 with a policy.
         max_steps: The step limit of episodes and rollouts.
         policy: The policy that the ant follows if there is no training.
-
-    Raises:
-        AntsError: A value is not allowed.
     """
 
     world: World
@@ -108,21 +105,15 @@ class RunPoint:
     after: ClassVar[None] = None
 
     def __post_init__(self) -> None:
-        (config,) = arguments.checked_configs(self.training)
-        object.__setattr__(self, "training", config)
-        arguments.checked_task(self.task, *arguments.ALONE)
-        _check_policy(self.policy, self.episodes)
-        more = "" if self.policy else "; 0 requires a policy"
-        checked_whole("episodes", self.episodes, 0 if self.policy else 1, otherwise=more)
+        _check(self, bool(self.policy), *arguments.ALONE)
         arguments.checked_max_steps(self.max_steps, self.task)
-        checked_whole("rollouts", self.rollouts)
 
     @property
     def alike(self) -> tuple:
         """The settings that all points of a block share."""
-        which = self.training.learner, self.training.planning_steps
+        learner = self.training.learner, self.training.planning_steps
         lengths = self.episodes, self.max_steps, self.rollouts
-        return (self.world, self.task, which, *lengths, self.policy)
+        return (self.world, self.task, learner, lengths, self.policy)
 
     @property
     def runs_of_a_block(self) -> int:
@@ -136,31 +127,25 @@ class RunPoint:
 
     @staticmethod
     def compute(
-        points: Sequence[RunPoint],
-        seeds: Sequence[int],
-        learned: np.ndarray | None,
-        progress: Progress,
-        where: Mapping[str, Any],
+        points: Sequence[RunPoint], seeds: Seeds, learned: Tables, progress: Progress, where: Where
     ) -> Outcome:
         """Return the outcomes of points of one block: arrays (points, seeds, ...)."""
         from taichi_ants.engines.runs.training import evaluate, train
 
-        first, configs = points[0], [point.training for point in points]
+        first, configs, shape = points[0], [p.training for p in points], (len(points), len(seeds))
         world, lengths, task = first.world, (first.episodes, first.max_steps), first.task
-        shape = len(points), len(seeds)
         if first.policy:
-            q_values = np.broadcast_to(
-                first.policy.q_values, (*shape, *first.policy.q_values.shape)
-            )
+            table = first.policy.q_values
+            q_values = np.broadcast_to(table, (*shape, *table.shape))
             outcome = {name: np.zeros((*shape, 0), np.int32) for name in _RUN_ARRAYS}
         else:
             trained = train(world, configs, seeds, *lengths, task, **where, progress=progress)
-            q_values = trained.q_values
             outcome = {name: files.small(getattr(trained, name)) for name in _RUN_ARRAYS}
-            outcome["q_values"] = q_values
+            outcome["q_values"] = q_values = trained.q_values
         greedy = evaluate(world, q_values, first.rollouts, seeds, first.max_steps, task, **where)
-        of_rollouts = {f"greedy_{name}": getattr(greedy, name) for name in _RUN_ARRAYS}
-        return outcome | {name: files.small(array) for name, array in of_rollouts.items()}
+        for name in _RUN_ARRAYS:
+            outcome[f"greedy_{name}"] = files.small(getattr(greedy, name))
+        return outcome
 
 
 @dataclass(frozen=True)
@@ -178,13 +163,19 @@ class FixedPolicy:
         return cls(name_or_path, hashlib.sha256(q_values.tobytes()).hexdigest(), q_values)
 
 
-def _check_policy(policy: FixedPolicy | None, episodes: int) -> None:
-    """Raise AntsError if there is a policy, but also training."""
-    if policy and episodes:
+def _check(point: Any, can_skip_training: bool, *supports: Any) -> None:
+    """Check what both kinds of points have, and complete the configuration of the learner."""
+    (config,) = arguments.checked_configs(point.training)
+    object.__setattr__(point, "training", config)
+    arguments.checked_task(point.task, *supports)
+    if point.policy and point.episodes:
         raise AntsError(
-            f"policy is {policy.name!r}, but episodes is {episodes}; a fixed policy does not "
-            "learn, so set episodes = 0."
+            f"policy is {point.policy.name!r}, but episodes is {point.episodes}; a fixed policy "
+            "does not learn, so set episodes = 0."
         )
+    more = "" if can_skip_training else "; 0 requires a policy"
+    checked_whole("episodes", point.episodes, int(not can_skip_training), otherwise=more)
+    checked_whole("rollouts", point.rollouts)
 
 
 @dataclass(frozen=True)
@@ -194,7 +185,7 @@ class ColonyPoint:
     Outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
     integer (seeds, rollouts), as in `ColonyEpisodes`; `q_values`, float32 (seeds, n_states, 5), if
     ants learned into a shared table. `series_NAME`, float64 (seeds, rollouts, rows), of each
-    measure NAME.
+    measure NAME. Raises AntsError if a value is not allowed.
 
     Attributes:
         world: The world, or the recipe of one for each seed, all of the same ranges.
@@ -214,9 +205,6 @@ class ColonyPoint:
             evaluation, without `Measure` objects.
         protocol: Events with interventions, see `taichi_ants.protocol`.
         during: When they happen: in each episode of the "evaluation", the "training", or "both".
-
-    Raises:
-        AntsError: A value is not allowed.
     """
 
     world: World | Drawn
@@ -240,14 +228,12 @@ class ColonyPoint:
     kind: ClassVar[str] = "colony"
 
     def __post_init__(self) -> None:
-        (config,) = arguments.checked_configs(self.training)
-        object.__setattr__(self, "training", config)
-        arguments.checked_task(self.task, "a colony", COLONY)
+        rule = self.task.choice
+        can_skip_training = self.after or self.policy or not rule.needs_table
+        _check(self, bool(can_skip_training), "a colony", COLONY)
         arguments.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
         check_one_of("sharing", self.sharing, ("shared", "independent"))
-        arguments.check_learner(config, self.task, self.sharing)
-        _check_policy(self.policy, self.episodes)
-        rule = self.task.choice
+        arguments.check_learner(self.training, self.task, self.sharing)
         for name in ("episodes", "policy", "after", "evaluation_epsilon"):
             if not rule.needs_table and getattr(self, name) not in (None, 0):
                 raise AntsError(
@@ -256,12 +242,8 @@ class ColonyPoint:
                 )
         if self.evaluation_epsilon is not None:
             arguments.checked_share("evaluation_epsilon", self.evaluation_epsilon)
-        without_training = self.after or self.policy or not rule.needs_table
-        more = "" if without_training else "; 0 requires a policy"
-        checked_whole("episodes", self.episodes, 0 if without_training else 1, otherwise=more)
         Recorder(self.measures, self.measure_every)  # raises an error if it cannot read them
         checked_whole("ticks", self.ticks, most=MAX_STEPS)
-        checked_whole("rollouts", self.rollouts)
         object.__setattr__(self, "protocol", checked_protocol(self.protocol))
         check_one_of("during", self.during, DURING)
         self._check_protocol()
@@ -273,13 +255,12 @@ class ColonyPoint:
         for learns in (True, False) if self.episodes else (False,):
             world = self.pool[0] if learns and self.pool else self.first_world
             for event in self.events(learns):
-                of_path = [other for other in self.protocol if other.path == event.path]
+                number = [e for e in self.protocol if e.path == event.path].index(event) + 1
                 try:
                     event.times(self.ticks)
                     for intervention in event.interventions:
                         intervention.check_in(world, self.task, learns)
                 except AntsError as error:
-                    number = of_path.index(event) + 1
                     raise AntsError(
                         f"in [[{event.path}]] number {number}, in the {DURING[learns]}, {error}"
                     ) from error
@@ -308,13 +289,10 @@ class ColonyPoint:
     @property
     def seconds(self) -> float:
         """The approximate time of a seed on one processor."""
-        cells = self.first_world.grid.size * sum(
-            _WORK_OF_DIFFUSION if field.diffusion else _WORK_OF_A_CELL
-            for field in (self.task.pheromone, *self.task.fields.values())
-            if field.dense
-        )
-        ticks = self.ticks * (self.episodes + self.rollouts)
-        return (self.ants + cells) * ticks / _TICKS_OF_A_SECOND
+        fields = [one for one in (self.task.pheromone, *self.task.fields.values()) if one.dense]
+        work = sum(_WORK_OF_DIFFUSION if one.diffusion else _WORK_OF_A_CELL for one in fields)
+        ants = self.ants + work * self.first_world.grid.size
+        return ants * self.ticks * (self.episodes + self.rollouts) / _TICKS_OF_A_SECOND
 
     def events(self, learns: bool) -> tuple[ProtocolEvent, ...]:
         """Return the events of episodes of training or, if not `learns`, of the evaluation."""
@@ -344,26 +322,20 @@ class ColonyPoint:
     @staticmethod
     def compute(
         points: Sequence[ColonyPoint],
-        seeds: Sequence[int],
-        learned: np.ndarray | None,
+        seeds: Seeds,
+        learned: Tables,
         progress: Progress,
-        where: Mapping[str, Any],
+        where: Where,
     ) -> Outcome:
-        """Return the outcome of the one point in `points`, arrays (1, seeds, ...).
-
-        `learned` has the tables of the point `after`, from which learning starts.
-        """
+        """Return the outcome of the one point in `points`, arrays (1, seeds, ...)."""
         (point,) = points
         share = point.episodes / (point.episodes + point.rollouts)
         tables = point.tables(seeds, learned, lambda done: progress(share * done), where)
         colony = point.colony(point.worlds(seeds), seeds, tables, False, **where)
+        how: dict[str, Any] = {"measures": point.measures, "every": point.measure_every}
+        how["protocol"] = point.events(learns=False)
         episodes = colony.run(
-            point.rollouts,
-            point.ticks,
-            lambda done: progress(share + (1 - share) * done),
-            measures=point.measures,
-            every=point.measure_every,
-            protocol=point.events(learns=False),
+            point.rollouts, point.ticks, lambda done: progress(share + (1 - share) * done), **how
         )
         outcome = {name: files.small(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
         if (series := episodes.series) is not None:
@@ -374,13 +346,8 @@ class ColonyPoint:
             outcome["q_values"] = tables
         return {name: array[None] for name, array in outcome.items()}
 
-    def tables(
-        self, seeds: Sequence[int], learned: Any, progress: Progress, where: Mapping[str, Any]
-    ) -> Any:
-        """Return the action values that ants follow in the evaluation; train them if necessary.
-
-        `learned` has the tables of the point `after`, from which learning starts.
-        """
+    def tables(self, seeds: Seeds, learned: Tables, progress: Progress, where: Where) -> Any:
+        """Return the action values that ants follow in the evaluation; train them if necessary."""
         if not self.episodes:
             return self.policy.q_values if self.policy else learned
         worlds, protocol = None, self.events(learns=True)
@@ -413,11 +380,12 @@ def key_of(point: Point, *more: str) -> str:
     if castes:  # whose policies are named by their files
         named = ((name, FixedPolicy.named(path, point.task)) for name, path in castes.items())
         facts["castes"] = {name: policy.sha256 for name, policy in named}
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:32]
+    text = json.dumps(facts, sort_keys=True, default=_identity)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def _changed(value: Any) -> Any:
-    """Return what identifies a value in JSON, without settings that have their defaults."""
+def _identity(value: Any) -> Any:
+    """Return what identifies an object that JSON does not have."""
     if isinstance(value, World):
         return _sum_of(value)
     if isinstance(value, Drawn):
@@ -426,25 +394,22 @@ def _changed(value: Any) -> Any:
         return value.sha256
     if isinstance(value, ProtocolEvent):
         return value.facts()
-    if isinstance(value, Mapping):  # in which the order of the names counts
-        return [[name, _changed(entry)] for name, entry in value.items()]
-    if hasattr(value, "__dataclass_fields__"):
-        pairs = ((getattr(value, each.name), each) for each in fields(value))
-        own = {each.name: setting for setting, each in pairs if setting != _default(each)}
-        if isinstance(value, TrainingConfig):
-            defaults = learners.get(value.learner).hyperparameters()
-            more = {n: v for n, v in value.hyperparameters if v != getattr(defaults, n, None)}
-            own["hyperparameters"] = sorted(more.items())
-        return {name: _changed(setting) for name, setting in own.items()}
-    if isinstance(value, (list, tuple)):
-        return [_changed(element) for element in value]
-    return value.item() if isinstance(value, np.generic) else value
+    return value.item() if isinstance(value, np.generic) else _changed(value)
 
 
-def _default(declared: Field[Any]) -> Any:
-    if declared.default_factory is MISSING:
-        return declared.default
-    return declared.default_factory()
+def _changed(value: Any) -> dict[str, Any]:
+    """Return the fields of a point or settings that do not have their defaults."""
+    own = {}
+    for each in fields(value):
+        make, setting = each.default_factory, getattr(value, each.name)
+        if setting != (each.default if make is MISSING else make()):
+            # The order of named settings counts.
+            own[each.name] = [*setting.items()] if isinstance(setting, Mapping) else setting
+    if isinstance(value, TrainingConfig):
+        defaults = learners.get(value.learner).hyperparameters()
+        more = {n: v for n, v in value.hyperparameters if v != getattr(defaults, n, None)}
+        own["hyperparameters"] = sorted(more.items())
+    return own
 
 
 @lru_cache(4096)
@@ -461,19 +426,14 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
     """
     points = tuple(dict.fromkeys(earlier for point in points for earlier in chain(point)))
     each = (map(w.of, seeds) if isinstance(w, Drawn) else w for w in _worlds_of(points))
-    columns = columns_of(points).items()
-    return {
-        "version": __version__,
-        "seeds": list(seeds),
-        "worlds": [
-            world_facts(worlds) if isinstance(worlds, World) else [*map(world_facts, worlds)]
-            for worlds in each
-        ],
-        **{
-            name: values[0] if all(v == values[0] for v in values) else values
-            for name, values in columns
-        },
-    }
+    facts = {"version": __version__, "seeds": list(seeds)}
+    facts["worlds"] = [
+        world_facts(worlds) if isinstance(worlds, World) else [*map(world_facts, worlds)]
+        for worlds in each
+    ]
+    for name, values in columns_of(points).items():
+        facts[name] = values[0] if all(value == values[0] for value in values) else values
+    return facts
 
 
 def _worlds_of(points: Sequence[Point]) -> list[Any]:
@@ -491,18 +451,16 @@ def columns_of(points: Sequence[Point]) -> dict[str, list[Any]]:
     }
     rows = []
     for point in points:
-        row = {field.name: getattr(point, field.name) for field in fields(point)}
-        for name in ("world", "pool", "after"):
-            row |= {name: numbers.get(row[name])} if row.get(name) else {}
-        protocol, during = row.pop("protocol", ()), row.pop("during", "")
-        if protocol:
-            row |= {"protocol": [event.facts() for event in protocol], "during": during}
-        row = {k: v for k, v in row.items() if k not in _LATER or v not in (None, ())}
+        row = {k: v for k, v in vars(point).items() if k not in _LATER or v not in (None, ())}
+        row |= {k: numbers.get(row[k]) for k in ("world", "pool", "after") if row.get(k)}
+        row |= {"task": point.task.as_dict(), "training": point.training.as_dict()}
         if policy := row.get("policy"):
             row["policy"] = {"name": policy.name, "sha256": policy.sha256}
-        rows.append(
-            flat({**row, "task": point.task.as_dict(), "training": point.training.as_dict()})
-        )
+        if protocol := row.get("protocol"):
+            row["protocol"] = [event.facts() for event in protocol]
+        else:
+            row.pop("during", None)
+        rows.append(flat(row))
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: [row.get(name) for row in rows] for name in names}
 

@@ -89,7 +89,7 @@ def replay(
         tables = point.tables([seed], learned, lambda share: None, where)
     colony = point.colony(point.worlds([seed]), [seed], tables, False, **where)
     colony.begin_episode(point.ticks)
-    recorder = Recorder(colony, 0, title)
+    recorder = Recorder(colony, title)
     frames = [recorder.snapshot()]
 
     def stepped(colony: Colony, n: int) -> Iterator[None]:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.analysis import sensitivity, sweeps
+from taichi_ants.analysis import sweeps
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.statistics import known_means
 from taichi_ants.errors import AntsError, shown
@@ -21,24 +20,15 @@ from taichi_ants.files import tables as tables_of
 from taichi_ants.measures import Run, finished
 from taichi_ants.measures.measure import RUN
 from taichi_ants.measures.series import stops
-from taichi_ants.settings import flat
+from taichi_ants.settings import declared, flat
 from taichi_ants.studies import design
-from taichi_ants.studies.design import GRID, Axis, Design, Range
+from taichi_ants.studies.design import COLUMNS, Axis, Design
 from taichi_ants.studies.folder import Results
 from taichi_ants.studies.points import SERIES
 from taichi_ants.studies.store import Arrays, parts_of
 from taichi_ants.studies.study import Study
-from taichi_ants.studies.sweep_file import (
-    Base,
-    Settings,
-    as_list,
-    axes_of,
-    check_entries,
-    check_training,
-)
+from taichi_ants.studies.sweep_file import Base, Settings, as_list, check_training
 
-FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
-SERIES_FILE, SENSITIVITY = "series.csv", "sensitivity.csv"
 _SHOWN_POINTS = 10  # of a design, in the report
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
@@ -48,59 +38,49 @@ class Sweep:
     """A sweep, read from a file.
 
     Attributes:
+        base: The part of the file without [vary] tables; figures show its first measure.
         study: The points over the seeds, each point once.
-        points: The point of each row of `settings`, which can repeat.
-        settings: The settings that vary.
-        grids: For each [vary] table of the file, the slice of `settings` that it defines.
-        measures: Names of measures; the figure shows the first.
-        measure_every: Ticks between two rows of `SERIES_FILE`; None without that file.
+        order: The index in the study of the point of each row of `settings`; points can repeat.
+        settings: The settings that vary, by row.
+        grids: For each [vary] table, its rows, and the values or ranges of its settings.
         against: The setting and its value with which all others are compared.
         margin: The largest difference in the first measure that is too small to matter.
-        design: The design of the points.
-        axes: For each [vary] table, the values or ranges of its settings.
     """
 
-    kind: str
+    base: Base
     study: Study
-    points: tuple[Any, ...]
-    settings: tuple[Settings, ...]
-    grids: tuple[slice, ...]
-    measures: tuple[str, ...]
-    measure_every: int | None
+    order: list[int]
+    settings: list[Settings]
+    grids: Sequence[tuple[slice, Mapping[str, Axis]]]
+    design: Design
     against: tuple[str, Any] | None
     margin: float
-    design: Design = field(default_factory=Design)
-    axes: tuple[Mapping[str, Axis], ...] = ()
 
     def facts(self) -> dict[str, Any]:
         """Return what determines the results besides the settings of the points."""
-        own = {"measures": self.measures, "against": self.against, "margin": self.margin}
-        own |= {"measure_every": self.measure_every} if self.measure_every else {}
-        return {**own, **self.design.facts(), "vary": self.settings}
-
-    @cached_property
-    def order(self) -> list[int]:
-        """The index in the study of the point of each row of `settings`."""
-        place = {point: n for n, point in enumerate(self.study.points)}
-        return [place[point] for point in self.points]
+        own = {"measures": self.base.measures, "against": self.against, "margin": self.margin}
+        every = {k: v for k, v in self.base.reading.items() if k == "measure_every"}
+        return {**own, **every, **self.design.facts(), "vary": self.settings}
 
     def findings(self, values: np.ndarray) -> dict[int, dict[str, Any]]:
-        """Return by point the finding on its difference from the point with the value `against`.
+        """Return by row the finding on its difference from the row with the value `against`.
 
-        `values` is the first measure, float64 (points, seeds). All intervals of a [vary] table hold
+        `values` is the first measure, float64 (rows, seeds). All intervals of a [vary] table hold
         at the same time.
         """
         if self.against is None:
             return {}
         (name, value), findings = self.against, {}
-        for grid in self.grids:
+        for grid, _ in self.grids:
             rows, of_grid = self.settings[grid], values[grid]
-            others = [{**row, name: value} for row in rows]
-            pairs = [(n, rows.index(other)) for n, other in enumerate(others) if other in rows]
-            pairs = [(n, other) for n, other in pairs if n != other]
-            differences = [of_grid[n] - of_grid[other] for n, other in pairs]
+            pairs = {
+                n: rows.index({**row, name: value})
+                for n, row in enumerate(rows)
+                if row.get(name) != value and {**row, name: value} in rows
+            }
+            differences = [of_grid[n] - of_grid[other] for n, other in pairs.items()]
             judged = judge([Contrast("", each, above(self.margin)) for each in differences])
-            for (n, _), difference, contrast in zip(pairs, differences, judged, strict=True):
+            for n, difference, contrast in zip(pairs, differences, judged, strict=True):
                 word = _WORDS.get(contrast.verdict.value, "undecided")
                 low, high = contrast.low, contrast.high
                 numbers = {"difference": contrast.effect, "low": low, "high": high}
@@ -130,40 +110,41 @@ def plan(options: Mapping[str, Any]) -> Sweep:
 
 def sweep_of(file: Settings) -> Sweep:
     """Return the sweep of the contents of a file; AntsError if a setting is not allowed."""
-    base, drawn = Base.of(file), Design.of(file)
-    axes = tuple(axes_of(base.kind, table, base.fixed) for table in as_list(file.get("vary", [])))
-    check_entries(file, {name for names in axes for name in names})
-    if not axes:
+    base = Base.of(file)
+    drawn = Design(**{key.name: file[key.name] for key in declared(Design) if key.name in file})
+    rows, grids = list[Settings](), []
+    for table in as_list(file.get("vary", [])):
+        axes = base.axes(table)
+        part = drawn.rows(axes)
+        grids.append((slice(len(rows), len(rows) + len(part)), axes))
+        rows += part
+    if not grids:
         raise AntsError("[vary] is missing; add it with lists of values of the settings that vary.")
-    if drawn.sensitivity and len(axes) > 1:
-        raise AntsError(f"sensitivity is for one [vary] table, but there are {len(axes)}.")
-    grids = [drawn.rows(of_table) for of_table in axes]
-    rows, built = tuple(itertools.chain(*grids)), dict[str, Any]()
+    if drawn.sensitivity and len(grids) > 1:
+        raise AntsError(f"sensitivity is for one [vary] table, but there are {len(grids)}.")
+    built = dict[str, Any]()
     points = tuple(base.point(row, built) for row in rows)
-    ends = list(itertools.accumulate(map(len, grids), initial=0))
-    parts = tuple(map(slice, ends, ends[1:]))
     check_training(base.fixed, points)
-    for names, part in zip(axes, parts, strict=True):
-        check_training(names, points[part])
+    for of_table, names in grids:
+        check_training(names, points[of_table])
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
     against: Any = flat(file["against"]) if isinstance(file.get("against"), dict) else {}
     (against,) = against.items() if len(against) == 1 else [None]
-    of_grid = drawn.kind == GRID and any(against in row.items() for row in rows)
+    of_grid = drawn.is_grid and any(against in row.items() for row in rows)
     if ("against" in file or "margin" in file) and not of_grid:
         raise AntsError(
             f"against is {shown(file.get('against'))}; with a grid, it must be one setting with "
             "one of its values in [vary], which margin requires."
         )
-    every, arrays = base.reading.get("measure_every"), base.measures
-    if every is not None:
+    arrays = base.measures
+    if "measure_every" in base.reading:
         arrays += tuple(f"{SERIES}{name}" for name in base.reading["measures"])
     study = Study(points, base.seeds, arrays, partial(_measured, base.kind, base.measures))
-    return Sweep(
-        *(base.kind, study, points, rows, parts, base.measures, every),
-        *(against, margin, drawn, axes),
-    )
+    place = {point: n for n, point in enumerate(study.points)}
+    order = [place[point] for point in points]
+    return Sweep(base, study, order, rows, grids, drawn, against, margin)
 
 
 def _measured(
@@ -195,23 +176,23 @@ def tables(sweep: Sweep, results: Results) -> str:
     if not len(some):
         raise AntsError("no runs are finished; wait for the first ones.")
     settings, present = [sweep.settings[n] for n in some], present[some]
-    arrays = results.read(results.study.keys, arrays=sweep.measures)
+    arrays = results.read(results.study.keys, arrays=sweep.base.measures)
     values = {name: array[np.array(sweep.order)[some]] for name, array in arrays.items()}
     p, s = np.nonzero(present)
     runs = {name: column[p] for name, column in tables_of.table_of(settings).items()}
     runs["seed"] = tables_of.column(sweep.study.seeds)[s]
     runs |= {name: array[p, s].astype(float) for name, array in values.items()}
-    tables_of.write(folder / RUNS, runs, results.parquet)
+    tables_of.write(folder / "runs.csv", runs, results.parquet)
     gaps = [name for name, array in values.items() if np.isnan(array).any()]
-    with_iqm = [name for name in values if finished.of_runs(sweep.kind, name).uses_iqm]
+    with_iqm = [name for name in values if finished.of_runs(sweep.base.kind, name).uses_iqm]
     centres = sweeps.centres_of(values, with_iqm)
     rows = [
         {**row, "seeds": int(seeds), **sweeps.centre_columns(centre, gaps)}
         for row, seeds, centre in zip(settings, present.sum(axis=1), centres, strict=True)
     ]
-    tables_of.write(folder / SUMMARY, tables_of.table_of(rows), results.parquet)
-    if sweep.measure_every is not None:
-        tables_of.write(folder / SERIES_FILE, _series(sweep, results), results.parquet)
+    tables_of.write(folder / "summary.csv", tables_of.table_of(rows), results.parquet)
+    if "measure_every" in sweep.base.reading:
+        tables_of.write(folder / "series.csv", _series(sweep, results), results.parquet)
     if results.part:
         return sweeps.report(settings, values)
 
@@ -220,48 +201,39 @@ def tables(sweep: Sweep, results: Results) -> str:
     if sweep.against:
         more = ["finding", "difference", "low", "high", *["left_out"] * (first in gaps)]
         columns = [*sweeps.columns_of(sweep.settings), *more]
-        files.write_csv(folder / FINDINGS, findings.values(), columns)
-    if sweep.design.kind == GRID:
+        files.write_csv(folder / "findings.csv", findings.values(), columns)
+    if sweep.design.is_grid:
         notes = [findings.get(n, {}).get("finding", "") for n in range(len(sweep.settings))]
         report = sweeps.report(sweep.settings, values, sweep.against, notes)
     else:
         report = _report_on_highest(sweep, values)
-    varying = list(design.varying(sweep.axes[0])) if sweep.design.sensitivity else []
-    indices = {
-        name: sensitivity.indices(name, varying, array)
-        for name, array in (values.items() if varying else ())
-    }
-    if indices:
-        report = f"{report}\n{sensitivity.report(indices, len(sweep.study.seeds))}"
-        fields = [name for name in sensitivity.Index._fields if name != "left_out" or gaps]
-        of_all = [
-            {name: getattr(index, name) for name in fields}
-            for index in itertools.chain(*indices.values())
-        ]
-        files.write_csv(folder / SENSITIVITY, of_all, fields)
+    if sweep.design.sensitivity:
+        ((_, axes),), seeds = sweep.grids, len(sweep.study.seeds)
+        names = list(design.varying(axes))
+        indices = [row for name in values for row in design.indices(name, names, values[name])]
+        report = f"{report}\n{design.report(indices, seeds)}"
+        files.write_csv(folder / "sensitivity.csv", indices, COLUMNS)
     if results.figures:
-        files.check_writable_folder(folder / FIGURES)
-        _draw(sweep, first, values[first], folder / FIGURES)
+        _draw(sweep, first, values[first], files.check_writable_folder(folder / "figures"))
     return report
 
 
 def _series(sweep: Sweep, results: Results) -> tables_of.Table:
     """Return the series of the registered measures, a row for each value."""
     parts, seeds = list[tables_of.Table](), tables_of.column(sweep.study.seeds)
-    point: Any
     settings = tables_of.table_of(sweep.settings)
-    for p, (point, present) in enumerate(zip(sweep.study.points, results.present, strict=True)):
-        names = [f"{SERIES}{name}" for name in point.measures]
+    for n, p in enumerate(sweep.order):
+        point: Any = sweep.study.points[p]
+        names, present = [f"{SERIES}{name}" for name in point.measures], results.present[p]
         arrays = results.read([results.study.keys[p]], arrays=names) if present.any() else {}
-        ticks = np.array(list(stops(point.ticks, sweep.measure_every or 1)))
+        ticks = np.array(list(stops(point.ticks, point.measure_every)))
         for name, array in arrays.items():
             values = array[0, present]
             s, episode, row = (index.ravel() for index in np.indices(values.shape))
-            measure = np.full(len(s), name.removeprefix(SERIES), object)
-            for n in np.flatnonzero(np.array(sweep.order) == p):
-                columns = {k: np.repeat(column[[n]], len(s)) for k, column in settings.items()}
-                columns |= {"seed": seeds[present][s], "episode": episode, "tick": ticks[row]}
-                parts.append({**columns, "measure": measure, "value": values.ravel()})
+            columns = {k: np.repeat(column[[n]], len(s)) for k, column in settings.items()}
+            columns |= {"seed": seeds[present][s], "episode": episode, "tick": ticks[row]}
+            columns["measure"] = np.full(len(s), name.removeprefix(SERIES), object)
+            parts.append({**columns, "value": values.ravel()})
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -272,18 +244,16 @@ def _report_on_highest(sweep: Sweep, values: dict[str, np.ndarray]) -> str:
     rows = {measure: array[order] for measure, array in values.items()}
     table = sweeps.report([sweep.settings[n] for n in order], rows)
     most = f"the {len(order)} with the highest {name}" if len(order) < len(means) else "all"
-    return f"{len(means)} points of the design {sweep.design.kind!r}; {most}:\n\n{table}"
+    return f"{len(means)} points of the design {sweep.design.design!r}; {most}:\n\n{table}"
 
 
 def _draw(sweep: Sweep, measure: str, values: np.ndarray, folder: Path) -> None:
-    """Draw a measure, float64 (points, seeds), in a figure for each [vary] table."""
-    label = finished.of_runs(sweep.kind, measure).label
-    for number, (grid, axes) in enumerate(zip(sweep.grids, sweep.axes, strict=True), start=1):
+    """Draw a measure, float64 (rows, seeds), in a figure for each [vary] table."""
+    label = finished.of_runs(sweep.base.kind, measure).label
+    for number, (grid, axes) in enumerate(sweep.grids, start=1):
         path = folder / f"{measure}{f'-{number}' * (len(sweep.grids) > 1)}.png"
-        settings = sweep.settings[grid]
-        if sweep.design.kind == GRID:
-            sweeps.draw(path, settings, values[grid], label)
+        if sweep.design.is_grid:
+            sweeps.draw(path, sweep.settings[grid], values[grid], label)
         else:
-            logs = {n for n, axis in axes.items() if isinstance(axis, Range) and axis.log}
             names = list(design.varying(axes))
-            sweeps.draw_design(path, settings, names, logs, values[grid], label)
+            sweeps.draw_design(path, sweep.settings[grid], names, values[grid], label)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
-from functools import cache
 from typing import Any, NamedTuple
 
-from taichi_ants import arguments, interventions, learners, measures, protocol, rules, worlds
-from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
+from taichi_ants import arguments, interventions, measures, protocol, rules, worlds
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, refuse, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
 from taichi_ants.measures.measure import RUN
@@ -21,17 +19,17 @@ from taichi_ants.settings import (
     flat,
     named_groups,
     nested,
+    not_a_setting,
     settings_of_entry,
 )
-from taichi_ants.studies import design
-from taichi_ants.studies.design import Axis, Choices, Range
+from taichi_ants.studies.design import Axis, Design, Range, settings_in
 from taichi_ants.studies.points import ColonyPoint, Drawn, FixedPolicy, Point, RunPoint
 from taichi_ants.task import Task
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = (  # keys that are not settings of points
-    *("kind", "seeds", "measures", "measure_every"),
-    *("margin", "against", "vary", *design.KEYS),
+    *("kind", "seeds", "measures", "measure_every", "margin", "against", "vary"),
+    *(key.name for key in declared(Design)),
 )
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
@@ -47,6 +45,7 @@ class Base(NamedTuple):
     """The part of a file that does not depend on how its points are chosen.
 
     Attributes:
+        tables: The file, with tables of events by their numbers: at.1
         fixed: The fixed settings by their full names.
         reading: The arguments of points that are not settings.
     """
@@ -54,6 +53,7 @@ class Base(NamedTuple):
     kind: str
     measures: tuple[str, ...]
     seeds: tuple[int, ...]
+    tables: Settings
     fixed: Settings
     reading: dict[str, Any]
 
@@ -67,23 +67,68 @@ class Base(NamedTuple):
             raise AntsError(f"measures is missing; name one or more of {finished.names_of(kind)}.")
         for name in wanted:
             finished.of_runs(kind, name)
-        _check_once("measures", wanted)
         beside = [_BESIDE[name] for name in wanted if name in _BESIDE]
         wanted = list(dict.fromkeys([*wanted, *beside]))
-        events = [name for name in protocol.EVENTS if name in file]
-        for name in events:
-            if not isinstance(file[name], list):
-                raise AntsError(f"[{name}] is one table; write [[{name}]] in double brackets.")
-            if kind != "colony":
-                raise AntsError(f"[[{name}]] is for kind 'colony'; leave it out.")
-        # So that [vary] can name the settings of an event: at.1.tick
-        numbered = {n: dict(zip(map(str, range(1, 10**6)), file[n], strict=False)) for n in events}
-        fixed = flat({n: v for n, v in {**file, **numbered}.items() if n not in _OF_FILE})
+        tables = dict(file)
+        for name in protocol.EVENTS.keys() & file.keys():
+            if not isinstance(file[name], list) or kind != "colony":
+                raise AntsError(f"[{name}] must be [[{name}]], in a file of kind 'colony'.")
+            tables[name] = {str(n): event for n, event in enumerate(file[name], start=1)}
+        fixed = flat({name: table for name, table in tables.items() if name not in _OF_FILE})
         seeds = file.get("seeds", 10)
         if not isinstance(seeds, list):
             seeds = range(checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds"))
         reading = _reading(kind, wanted, file.get("measure_every"))
-        return cls(kind, tuple(wanted), arguments.checked_seeds(seeds), fixed, reading)
+        return cls(kind, tuple(wanted), arguments.checked_seeds(seeds), tables, fixed, reading)
+
+    def axes(self, table: Any) -> dict[str, Axis]:
+        """Return the values or ranges of the settings in a [vary] table, by their full names.
+
+        Raises:
+            AntsError: A range is not allowed, or a setting is fixed, too, or of an event, field,
+                caste or food without a table in the file. Points check values.
+        """
+        if not isinstance(table, dict) or not table:
+            raise AntsError("[vary] is empty; add lists of values of the settings that vary.")
+        axes: dict[str, Axis] = {}
+        for name, values in settings_in(table):
+            if not values or name in _OF_FILE:
+                raise AntsError(f"{name} cannot vary, or has no values; give a value or a range.")
+            for other in self.fixed:  # a group and one of its settings exclude each other, too
+                if f"{other}.".startswith(f"{name}.") or f"{name}.".startswith(f"{other}."):
+                    raise AntsError(
+                        f"{name} is in [vary], and {other} in the fixed settings; remove one."
+                    )
+            self._check_has_table(name)
+            if isinstance(values, dict):
+                axes[name] = self._range(name, values)
+            else:
+                _check_once(name, values)
+                axes[name] = values
+        return axes
+
+    def _check_has_table(self, name: str) -> None:
+        """Raise AntsError if a setting is of a name without a table; rules need none."""
+        groups = "|".join([*(group.path for group in named_groups(Task)), *protocol.EVENTS])
+        entry = re.match(rf"({groups})\.([^.]+)", name)
+        if entry is None or entry[2] in rules.names():
+            return
+        table: Any = self.tables
+        for key in entry[0].split("."):
+            table = table.get(key) if isinstance(table, dict) else None
+        if table is None:
+            raise AntsError(f"{name} is in [vary], but the file has no table {entry[0]}; add it.")
+
+    def _range(self, name: str, table: Settings) -> Range:
+        """Return a range, whose ends are checked, because drawn points lack them."""
+        declaration = declaration_of(name, self.fixed)
+        if declaration is None:
+            of_points = (f.name for f in fields(KINDS[self.kind]) if "int" in str(f.type))
+            return Range.of(name, table, name in ("world.seed", *of_points))
+        limits = Range.of(name, table, declaration.kind is int)
+        for end in (limits.low, limits.high):
+            declaration.checked(end)
+        return limits
 
     def point(self, row: Settings, built: dict[str, Any]) -> Point:
         """Return the point of the fixed settings and a row of others.
@@ -91,20 +136,17 @@ class Base(NamedTuple):
         Reuses worlds and policies in `built`, and adds new ones. Raises AntsError if a setting is
         not allowed, or there are too few episodes for a measure.
         """
-        settings = {**self.fixed, **row}
-        learner = settings.get("training.learner")
-        more: Any = learners.get(str(learner)).hyperparameters if learner else None
-        known = _known(self.kind, more)
-        of_events = re.compile(rf"({'|'.join(protocol.EVENTS)})\.\d+\.")
-        for name in settings:
-            # The world checks its settings, named groups and events check theirs.
-            if not (name in known or _tables().fullmatch(name) or of_events.match(name)):
-                raise AntsError(
-                    f"{shown(name)} is not a setting {_rather(name, self.kind, known)}."
-                )
-        tree = nested(settings)
-        events = {name: tree.pop(name) for name in protocol.EVENTS if name in tree}
+        tree = nested(self.fixed | row)
+        named = [name for name in protocol.EVENTS if isinstance(tree.get(name), Mapping)]
+        events = {name: tree.pop(name) for name in named}
         world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
+        for part, table in zip(_PARTS, (world, task, training), strict=False):
+            expect(part, table, Mapping)
+        known = [field.name for field in fields(KINDS[self.kind]) if field.name not in _PARTS]
+        for name in tree:  # the world, task, training and events check theirs
+            if name not in known:
+                of = f"a sweep of kind {self.kind!r}"
+                raise AntsError(f"{name!r} {not_a_setting(name, [*known, *_OF_FILE], of)}")
         preset = task.pop("preset", "paper")
         check_one_of("task.preset", preset, tuple(Task.named()))
         task = Task.named()[preset].replace(**task)
@@ -119,8 +161,7 @@ class Base(NamedTuple):
         if key not in built:
             built[key] = _world(self.kind, world)
         if events:
-            of_kinds = ((kind, sorted(tables, key=int)) for kind, tables in events.items())
-            lists = {kind: [events[kind][n] for n in numbers] for kind, numbers in of_kinds}
+            lists = {name: [of[n] for n in sorted(of, key=int)] for name, of in events.items()}
             tree["protocol"] = protocol.read(lists)
         for setting in declared(TrainingConfig)[:5]:  # the others have defaults
             if setting.name not in training:
@@ -132,9 +173,7 @@ class Base(NamedTuple):
             is_last = name.endswith("_last50")
             least = finished.WINDOW if is_last else finished.of_runs(self.kind, name).episodes
             if point.episodes < least:
-                raise AntsError(
-                    f"{name} needs {least} episodes; use more or choose another measure."
-                )
+                raise AntsError(f"{name} needs {least} episodes; use more or another measure.")
         return point
 
 
@@ -166,81 +205,27 @@ def _check_once(name: str, values: list) -> None:
             raise AntsError(f"{name} has {shown(value)} more than once; remove one of them.")
 
 
-def axes_of(kind: str, table: Any, fixed: Settings) -> dict[str, Axis]:
-    """Return the values or ranges of the settings in a [vary] table, by their full names.
-
-    Raises:
-        AntsError: A range is not allowed, or a setting is in `fixed`, too. Points check values.
-    """
-    if not isinstance(table, dict) or not table:
-        raise AntsError("[vary] is empty; add lists of values of the settings that vary.")
-    axes: dict[str, Axis] = {}
-    for name, values in design.axes_of(table):
-        if not values or name in _OF_FILE:
-            raise AntsError(f"{name} cannot vary, or has no values; give at least one, or a range.")
-        for other in fixed:  # a group and one of its settings exclude each other, too
-            if f"{other}.".startswith(f"{name}.") or f"{name}.".startswith(f"{other}."):
-                raise AntsError(
-                    f"{name} is in [vary], and {other} in the fixed settings; remove one of them."
-                )
-        if isinstance(values, dict):
-            declaration = declaration_of(name, fixed)
-            of_points = (f.name for f in fields(KINDS[kind]) if "int" in str(f.type))
-            whole = declaration.kind is int if declaration else name in ("world.seed", *of_points)
-            axes[name] = limits = Range.of(name, values, whole)
-            if declaration:
-                for end in (limits.low, limits.high):  # which drawn points lack
-                    declaration.checked(end)
-        else:
-            _check_once(name, values)
-            axes[name] = Choices(tuple(values))
-    return axes
-
-
 def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:
     """Return the declaration of a setting; None if the task, training, world and events lack it.
 
     Also None for the short form of an intervention.
     """
-    event, path = re.fullmatch(rf"({'|'.join(protocol.EVENTS)})\.\d+\.(.*)", name), name
-    if event and not event[2].startswith("task."):
-        group, _, last = event[2].rpartition(".")
+    event = re.fullmatch(rf"({'|'.join(protocol.EVENTS)})\.\d+\.(.*)", name)
+    path = event[2] if event else name
+    if event and not path.startswith("task."):
+        group, _, path = path.rpartition(".")
         of: Any = interventions.INTERVENTIONS.get(group, protocol.EVENTS[event[1]])
         known = [s._replace(path=s.name) for s in declared(of) if not s.is_group]
-        path = last
     else:
-        path = event[2] if event else name
         preset = fixed.get("world.preset", "paper")
         of_world = worlds.settings_of(preset) if preset in worlds.names() else ()
         known = [*all_of(Task), *declared(TrainingConfig), *of_world]
-        for group in named_groups(Task):
-            entry = path.removeprefix(f"{group.path}.").partition(".")[0]
-            # `check_entries` refuses the names of other rules.
-            is_rule = group.path == "task.rules"
-            if path.startswith(f"{group.path}.") and (not is_rule or entry in rules.names()):
-                known += settings_of_entry(group, entry).values()
+        for named in named_groups(Task):
+            entry = re.match(rf"{named.path}\.([^.]+)\.", path)
+            # The parameters of rules that are not registered are unknown.
+            if entry and (named.path != "task.rules" or entry[1] in rules.names()):
+                known += settings_of_entry(named, entry[1]).values()
     return next((s._replace(path=name) for s in known if s.path == path), None)
-
-
-def check_entries(file: Settings, varied: Iterable[str]) -> None:
-    """Raise AntsError if [vary] names a field or a kind of food for which the file has no table.
-
-    The parameters of a registered rule need none.
-    """
-    for group in named_groups(Task):
-        tables: Any = file
-        for key in group.path.split("."):
-            tables = tables.get(key, {}) if isinstance(tables, dict) else {}
-        listed = list(tables) if isinstance(tables, dict) else []
-        listed += rules.names() if group.path == "task.rules" else []
-        for name in sorted(varied):
-            entry = name.removeprefix(f"{group.path}.").partition(".")[0]
-            if name.startswith(f"{group.path}.") and entry not in listed:
-                path, near = f"{group.path}.{entry}", difflib.get_close_matches(entry, listed, 3)
-                choose = f"choose {', '.join(near or listed)}, or " if listed else ""
-                raise AntsError(
-                    f"`{path}` is in [vary], but the file has no table [{path}]; {choose}add it."
-                )
 
 
 def check_training(names: Iterable[str], points: Sequence[Point]) -> None:
@@ -255,50 +240,15 @@ def check_training(names: Iterable[str], points: Sequence[Point]) -> None:
     )
 
 
-@cache
-def _known(kind: str, hyperparameters: type | None) -> dict[str, None]:
-    """Return the names of the settings of points of this kind, except those of named groups."""
-    more = declared(hyperparameters) if hyperparameters else ()
-    names = [
-        *(field.name for field in fields(KINDS[kind]) if field.name not in _PARTS),
-        "task.preset",
-        # A group of settings can be set by a name, if it has names.
-        *(s.path for s in all_of(Task) if not s.is_group or s.has_names),
-        *(s.path for s in (*declared(TrainingConfig), *more)),
-    ]
-    return dict.fromkeys(names)
-
-
-@cache
-def _tables() -> re.Pattern[str]:
-    """Return a pattern of the settings of worlds, and of those in tables of entries with names."""
-    tables = ["world.regions", *(group.path for group in named_groups(Task))]
-    return re.compile(rf"world\.[^.]*|({'|'.join(map(re.escape, tables))})\..*")
-
-
-def _rather(name: str, kind: str, known: Iterable[str]) -> str:
-    """Return the end of a sentence on a setting that does not exist: the nearest ones."""
-    for other in KINDS.keys() - {kind}:
-        if name in _known(other, None):
-            return f"of kind {kind!r}, but of {other!r}; leave it out"
-    group, _, last = name.rpartition(".")
-    same = [k for k in known if k.endswith(f".{last}") or k.startswith(f"{name}.")]
-    near = same or difflib.get_close_matches(name, [*known, *_OF_FILE], 3)
-    near = near or [k for k in known if k.rpartition(".")[0] == group]
-    return f"of this sweep; choose one of {', '.join(near)}"
-
-
 def _world(kind: str, settings: Settings) -> Any:
-    preset, drawn = settings.pop("preset", "paper"), "seed" in settings
-    first, per_seed = settings.pop("seed", 0), settings.pop("per_seed", False)
-    regions = settings.pop("regions", {})
-    if not isinstance(regions, Mapping):
-        raise AntsError(f"world.regions is {shown(regions)}; it must be a table of regions.")
-    if checked_flag("world.per_seed", per_seed) and kind == "runs":
-        raise AntsError('world.per_seed is true, but kind is "runs"; leave it out.')
-    if per_seed or drawn:
+    preset, first = settings.pop("preset", "paper"), settings.pop("seed", None)
+    per_seed, regions = settings.pop("per_seed", False), settings.pop("regions", {})
+    expect("world.regions", regions, Mapping)
+    if per_seed not in ((True, False) if kind == "colony" else (False,)):
+        refuse("world.per_seed", per_seed, "true or false for kind 'colony', else left out")
+    if per_seed or first is not None:
         worlds.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
-    if not per_seed:
-        return worlds.build(preset, first, **settings).with_regions(regions)
-    checked_whole("world.seed", first, -(2**62), 2**62)
-    return Drawn.by(preset, first, regions, **settings)
+    first = checked_whole("world.seed", first or 0, -(2**62), 2**62)
+    if per_seed:
+        return Drawn.by(preset, first, regions, **settings)
+    return worlds.build(preset, first, **settings).with_regions(regions)

@@ -2,14 +2,12 @@
 
 - `record_trace` and `record_colony` make a `Recording`; a `Recorder` makes its frames one at a time
   while your code runs the colony.
-- `page` returns the page of a recording, `save_page` writes it, `frame` shows it in a notebook.
+- `page` returns the page of a recording, and `save_page` writes it; notebooks show recordings.
 """
 
-from taichi_ants.viewer.frames import Recording
-from taichi_ants.viewer.page import check_page, frame, notebook, page, save_page
+from taichi_ants.viewer.page import Recording, check_page, page, save_page
 from taichi_ants.viewer.recorder import Recorder, record_colony, record_trace
 
 __all__ = [
-    "Recorder", "Recording", "check_page", "frame", "notebook", "page", "record_colony",
-    "record_trace", "save_page",
+    "Recorder", "Recording", "check_page", "page", "record_colony", "record_trace", "save_page",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Frames, which hold the changes of a world since the previous frame as bytes; and recordings.
+"""Frames, which hold the changes of a world since the previous frame as bytes.
 
 A frame is a list of arrays, its sections, in little-endian order. It begins with uint32 numbers:
 its length in bytes, and the number of elements of each section. Each section begins at a multiple
@@ -7,10 +7,7 @@ of eight bytes, so that NumPy and JavaScript can read it without a copy.
 
 from __future__ import annotations
 
-import json
-import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,16 +15,8 @@ import numpy as np
 # Elements of `clock`, in order. `deliveries` and `returns` count this episode, `delivered` and
 # `ticks` all episodes. The level of a trail is its value in `trail` minus `trail_clock`, or 0.
 CLOCK = (
-    "episode",
-    "tick",
-    "deliveries",
-    "returns",
-    "epsilon",
-    "learning_rate",
-    "ants",
-    "delivered",
-    "ticks",
-    "trail_clock",  # then those of the fields in order
+    *("episode", "tick", "deliveries", "returns", "epsilon", "learning_rate"),
+    *("ants", "delivered", "ticks", "trail_clock"),  # then the clocks of the fields in order
 )
 
 # Elements of a point of the curves, in order. `ticks` and `delivered` count all episodes,
@@ -96,26 +85,3 @@ def pack(types: Mapping[str, str], sections: Mapping[str, Any]) -> bytes:
     body, begin = b"".join(parts), 8 * -(-(1 + len(types)) // 2)
     numbers = np.array([begin + len(body), *head], dtype="<u4").tobytes()
     return numbers.ljust(begin, b"\0") + body
-
-
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """A recording of a colony, which a page can play.
-
-    Attributes:
-        header: Facts about all frames, JSON-compatible, see `Recorder.header`.
-        frames: The first snapshot, then the changes up to each later one.
-    """
-
-    header: dict[str, Any]
-    frames: list[bytes]
-
-    def __len__(self) -> int:
-        return len(self.frames)
-
-    def to_bytes(self) -> bytes:
-        """Return the compressed recording for a page: its header as JSON, then all frames."""
-        header = json.dumps(self.header, separators=(",", ":")).encode()
-        header += b" " * (-(len(header) + 4) % 8)  # frames begin at a multiple of eight
-        length = np.array([len(header)], dtype="<u4").tobytes()
-        return zlib.compress(b"".join([length, header, *self.frames]), 9)

@@ -1,31 +1,55 @@
-"""Pages: markup, style, script and a recording in a single file."""
+"""Recordings, and their pages: markup, style, script and a recording in a single file."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 import html
+import json
+import zlib
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from taichi_ants import files
-from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.runs.results import Trace
 from taichi_ants.errors import expect
-from taichi_ants.rendering.snapshots import picture
-from taichi_ants.rendering.writers import check_file, png, write
-from taichi_ants.viewer.frames import Recording
-from taichi_ants.viewer.recorder import record_colony, record_trace
-from taichi_ants.worlds.world import World
+from taichi_ants.rendering.writers import check_file, write
 
 # The parts of the script, in this order: each part uses only those before it.
 SCRIPTS = ("history.js", "stage.js", "panel.js", "timeline.js", "viewer.js")
 STYLES = ("colours.css", "viewer.css")
 _NOTEBOOK_HEIGHT = 720  # pixels
-# Above these limits, notebooks show text, because a page would be too slow or too large.
-_MOST_CELLS, _MOST_ANTS, _MOST_STEPS = 200_000, 20_000, 10_000
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording of a colony, which a page can play.
+
+    Attributes:
+        header: Facts about all frames, JSON-compatible, see `Recorder.header`.
+        frames: The first snapshot, then the changes up to each later one.
+    """
+
+    header: dict[str, Any]
+    frames: list[bytes]
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def to_bytes(self) -> bytes:
+        """Return the compressed recording for a page: its header as JSON, then all frames."""
+        header = json.dumps(self.header, separators=(",", ":")).encode()
+        header += b" " * (-(len(header) + 4) % 8)  # frames begin at a multiple of eight
+        length = len(header).to_bytes(4, "little")
+        return zlib.compress(b"".join([length, header, *self.frames]), 9)
+
+    def _repr_html_(self) -> str:
+        """Return the page inside an HTML frame, for notebooks."""
+        whole, title = html.escape(page(self)), html.escape(self.header["title"])
+        size = f'width="100%" height="{_NOTEBOOK_HEIGHT}" style="border: 0"'
+        return f'<iframe title="{title}" {size} srcdoc="{whole}"></iframe>'
 
 
 @cache
@@ -100,32 +124,3 @@ def save_page(path: files.PathLike, recording: Recording) -> None:
         AntsError: The file does not end in .html, or is not writable.
     """
     write(check_page(path), page(recording).encode())
-
-
-def frame(recording: Recording) -> str:
-    """Return the page inside an HTML frame, for notebooks; raises as `page` does."""
-    whole, title = html.escape(page(recording)), html.escape(recording.header["title"])
-    size = f'width="100%" height="{_NOTEBOOK_HEIGHT}" style="border: 0"'
-    return f'<iframe title="{title}" {size} srcdoc="{whole}"></iframe>'
-
-
-def notebook(media: Any) -> str | None:
-    """Return HTML that shows a world, recording, trace or colony; None if it is too large.
-
-    IPython calls this function, see `taichi_ants.__init__`.
-    """
-    if isinstance(media, Recording):
-        return frame(media)
-    if isinstance(media, World):
-        if media.grid.size > _MOST_CELLS:
-            return None
-        # The alternative text is for screen readers.
-        content = base64.b64encode(png(picture(media), optimize=True)).decode()
-        return f'<img alt="{html.escape(repr(media))}" src="data:image/png;base64,{content}">'
-    if isinstance(media, Trace):
-        small = media.arguments is not None and len(media) <= _MOST_STEPS
-        return frame(record_trace(media)) if small else None
-    expect("the object", media, Colony)
-    if media.grid.size > _MOST_CELLS or media.ants > _MOST_ANTS or media.episode < 0:
-        return None
-    return frame(record_colony(media))

@@ -6,7 +6,7 @@ A colony of one ant replays the episode of a trace.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,8 @@ from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import COMPASS, TRAIL
-from taichi_ants.viewer.frames import Recording, pack, types_of
+from taichi_ants.viewer.frames import pack, types_of
+from taichi_ants.viewer.page import Recording
 
 _MOST_NAMES = 4096  # states up to which a header names all states, seen or not
 _RESTS = 15  # the action of an ant that rests in frames
@@ -33,34 +34,26 @@ Point = tuple[float, ...]  # see `frames.POINT`
 
 
 class Recorder:
-    """Makes frames of one world of a colony: `snapshot` of the present, `tick` over time.
+    """Makes frames of the first world of a colony: `snapshot` of the present, `tick` over time.
 
     Args:
         colony: A colony in an episode.
-        world: The number of the world.
         title: The title of the page; "" for a description of the colony.
         follow: The number of the ant that the page follows at first.
-
-    Raises:
-        AntsError: `world` is not the number of a world.
     """
 
-    def __init__(
-        self,
-        colony: Colony,
-        world: int = 0,
-        title: str = "",
-        follow: int | None = None,
-    ) -> None:
+    def __init__(self, colony: Colony, title: str = "", follow: int | None = None) -> None:
         expect("colony", colony, Colony)
         expect("title", title, str)
-        self.colony, self.world, self._title, self._follow = colony, world, title, follow
-        self.grid, self._n_states = colony.snapshot(world).grid, colony.task.n_states
+        self.colony, self._title, self._follow = colony, title, follow
+        self.grid, self._n_states = colony.snapshot().grid, colony.task.n_states
         self._learns, owners = colony.sharing != "frozen", colony.owners
         dense = (one.dense for one in colony.pheromones)
         self.types = types_of(self.grid.size, self._n_states, *dense)
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables that were sent
         self._owners = np.full(owners, -1) if colony.one_a_slot else np.arange(owners)
+        few = self._n_states <= _MOST_NAMES
+        self._named = set(range(self._n_states)) if few else set()  # states with names on pages
         # For curves: the first episode, the ticks until the last end that was noted, its episode.
         self._first, self._before, self._ended = colony.episode, 0, -1
         self._every, self._seen = 1, 0  # one of `_every` points is kept
@@ -70,10 +63,7 @@ class Recorder:
 
     def _forget(self) -> None:
         """Begin with the data of a page that has read no frames."""
-        self._numbers, self._queens = (np.zeros(0, np.int32) for _ in range(2))
-        self._ground, self._kinds = (np.zeros(self.grid.size, np.uint8) for _ in range(2))
-        # The pheromones, as they are stored.
-        self._trails = [np.zeros(self.grid.size) for _ in self.colony.pheromones]
+        self._sent: dict[str, Any] = {}  # numbers, queens, and layers of cells, as last sent
         self._table = np.full((len(self._known), N_ACTIONS), np.nan, np.float32)
 
     @property
@@ -91,8 +81,8 @@ class Recorder:
             return
         outcome, ticks = colony.outcome(), self.ticks
         if self._seen % self._every == 0:
-            delivered = colony.delivered[self.world] + outcome.deliveries[0, self.world]
-            returns = outcome.returns[0, self.world]
+            delivered = colony.delivered[0] + outcome.deliveries[0, 0]
+            returns = outcome.returns[0, 0]
             numbers = (colony.episode, ticks, delivered, returns, colony.epsilon, ended)
             self._points.append(tuple(map(float, numbers)))
             self._new.append(self._points[-1])
@@ -132,7 +122,7 @@ class Recorder:
             ],
             "nests": colony.n_nests,
             "n_states": self._n_states,
-            "names": self.names(),
+            "names": self._names(self._named | self._seen_states()),
             "view": list(task.sees.cells),
             "letters": task.sees.letters,
             "actions": ACTION_NAMES,
@@ -158,15 +148,22 @@ class Recorder:
             "about": self._about(),
         }
 
-    def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
-        """Return the `name_parts` of the states seen so far, except those in `known`.
+    def new_names(self) -> dict[int, tuple[str, str, list[str]]]:
+        """Return the `name_parts` of states that ants have visited since the last call.
 
-        If there are few states, it returns those of all.
+        Returns none if there are few states, because the header has the names of all.
         """
-        few = self._n_states <= _MOST_NAMES
-        seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
-        named = range(self._n_states) if few else seen
-        return {s: name_parts(self.colony.task.sees, s) for s in named if s not in known}
+        new = self._seen_states() - self._named
+        self._named |= new
+        return self._names(new)
+
+    def _seen_states(self) -> set[int]:
+        """Return the states that ants have visited, if the header does not have all names."""
+        few = len(self._named) == self._n_states
+        return set() if few else {*(np.flatnonzero(self._known) % self._n_states).tolist()}
+
+    def _names(self, states: set[int]) -> dict[int, tuple[str, str, list[str]]]:
+        return {state: name_parts(self.colony.task.sees, state) for state in sorted(states)}
 
     def _about(self) -> list[tuple[str, str]]:
         colony, config = self.colony, self.colony.training
@@ -175,7 +172,7 @@ class Recorder:
         lines = {
             "world": f"{self.grid.count} cells, ranges {x}, {y}, {z}",
             "ants at the start": str(colony.ants),
-            "seed": str(colony.seeds[self.world]),
+            "seed": str(colony.seeds[0]),
             "observation": f"{task.sees.name}, {self._n_states} states",
             "nests": str(colony.n_nests) if colony.n_nests > 1 else "",
             "castes": ", ".join(task.castes),
@@ -217,37 +214,37 @@ class Recorder:
             self.colony.tick(n)
             return self._frame({})
         colony, slots = self.colony, self._living()
-        states, numbers = colony.states[self.world, slots], colony.numbers[self.world, slots]
+        states, numbers = colony.states[0, slots], colony.numbers[0, slots]
         before, ahead = self._tables(), np.zeros(len(slots), bool)
         if colony.model.draws_next_action:
-            ahead = colony.next_actions[self.world, slots] >= 0
+            ahead = colony.next_actions[0, slots] >= 0
         colony.tick()
         # Slots of ants that died still hold their data.
-        after = colony.numbers[self.world]
+        after = colony.numbers[0]
         order = np.argsort(after, kind="stable")
         places = order[np.searchsorted(after, numbers, sorter=order)]
-        actions = colony.actions[self.world, places]
-        executed = colony.executed[self.world, places]
+        actions = colony.actions[0, places]
+        executed = colony.executed[0, places]
         executed = np.where(executed < 0, _RESTS, executed)
-        acts = {"acts": executed + 16 * colony.events[self.world, places]}
+        acts = {"acts": executed + 16 * colony.events[0, places]}
         acts["choices"] = np.where(actions < 0, _RESTS, actions + 8 * ahead)
-        acts["rewards"] = colony.rewards[self.world, places]
+        acts["rewards"] = colony.rewards[0, places]
         if td_errors is None and self._learns:
             td_errors = self._td_errors(before, slots, states, actions)
         return self._frame(acts if td_errors is None else {**acts, "td_errors": td_errors})
 
     def _living(self) -> np.ndarray:
         """Return the slots of living ants in the order of their numbers."""
-        (slots,) = np.nonzero(self.colony.living[self.world])
-        return slots[np.argsort(self.colony.numbers[self.world, slots], kind="stable")]
+        (slots,) = np.nonzero(self.colony.living[0])
+        return slots[np.argsort(self.colony.numbers[0, slots], kind="stable")]
 
     def _tables(self) -> np.ndarray:
         """Return the rows of all tables, float32 (owners * n_states, 5)."""
-        return self.colony.q_values[self.world].reshape(-1, N_ACTIONS)
+        return self.colony.q_values[0].reshape(-1, N_ACTIONS)
 
     def _rows(self, slots: np.ndarray, states: np.ndarray) -> np.ndarray:
         """Return the rows of `_tables` that hold the states of ants."""
-        return self.colony.tables_of_ants[self.world, slots] * self._n_states + states
+        return self.colony.tables_of_ants[0, slots] * self._n_states + states
 
     def _td_errors(
         self, before: np.ndarray, slots: np.ndarray, states: np.ndarray, actions: np.ndarray
@@ -264,7 +261,7 @@ class Recorder:
         pairs = self._rows(slots, states) * N_ACTIONS + actions[acted]
         moved = self._tables().astype(np.float64).ravel()[pairs] - before.ravel()[pairs]
         _, pair, ants = np.unique(pairs, return_inverse=True, return_counts=True)
-        castes = self.colony.castes[self.world, slots]
+        castes = self.colony.castes[0, slots]
         weights = update_weights_of(self.colony, castes, ants[pair])
         values = np.full(len(moved), np.nan)
         errors[acted] = np.divide(moved, weights, out=values, where=weights > 0)
@@ -272,12 +269,10 @@ class Recorder:
 
     def _frame(self, sections: dict[str, Any]) -> bytes:
         """Return a frame of the changes since the last one, added to `sections`."""
-        colony, snapshot = self.colony, self.colony.snapshot(self.world)
+        colony, snapshot = self.colony, self.colony.snapshot()
         outcome, slots = colony.outcome(), self._living()
         order = np.argsort(snapshot.ant_numbers, kind="stable")  # as `slots`
         numbers = snapshot.ant_numbers[order]
-        if not np.array_equal(numbers, self._numbers):
-            sections["numbers"] = self._numbers = numbers
         sections["cells"] = snapshot.ant_cells[order]
         carrying, nests = snapshot.ant_carries[order], snapshot.ant_nests[order]
         sections["poses"] = snapshot.ant_headings[order] + 8 * carrying + 16 * nests
@@ -289,27 +284,25 @@ class Recorder:
                 mark.fades(snapshot.of_ants[mark.view][order], feature.of(colony.task))
                 for feature, mark in self._marks
             ]
-        if not np.array_equal(snapshot.queens, self._queens):
-            sections["queens"] = self._queens = snapshot.queens
-        sections["states"] = colony.states[self.world, slots]
-        tick = int(outcome.ticks[0, self.world])
-        totals = (outcome.deliveries[0, self.world], outcome.returns[0, self.world])
+        for name, values in (("numbers", numbers), ("queens", snapshot.queens)):
+            if not np.array_equal(values, self._sent.get(name, ())):
+                sections[name] = self._sent[name] = values
+        sections["states"] = colony.states[0, slots]
+        tick = int(outcome.ticks[0, 0])
+        totals = (outcome.deliveries[0, 0], outcome.returns[0, 0])
         rates = (colony.epsilon, colony.learning_rate)
-        delivered = colony.delivered[self.world] + totals[0]
+        delivered = colony.delivered[0] + totals[0]
         counts = (len(numbers), delivered, self.ticks)
-        stored = [colony.stored_pheromone(self.world, n) for n in range(len(self._trails))]
+        stored = [colony.stored_pheromone(0, n) for n in range(len(colony.pheromones))]
         clocks = [clock for _, clock in stored]
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, *clocks)
         sections["progress"], self._new = self._new, []
         layers = {"ground": snapshot.ground, "kinds": snapshot.food_kinds}
+        layers |= {f"trail{number or ''}": layer.copy() for number, (layer, _) in enumerate(stored)}
         for name, layer in layers.items():
-            cells = np.flatnonzero(getattr(self, f"_{name}") != layer)
+            cells = np.flatnonzero(self._sent.get(name, 0) != layer)
             sections |= {f"{name}_at": cells, name: layer[cells]}
-            setattr(self, f"_{name}", layer)
-        for number, (layer, _) in enumerate(stored):
-            cells, name = np.flatnonzero(self._trails[number] != layer), f"trail{number or ''}"
-            sections |= {f"{name}_at": cells, name: layer[cells]}
-        self._trails = [layer.copy() for layer, _ in stored]
+        self._sent |= layers
         sections |= self._table_changes(slots, numbers, sections["states"])
         return pack(self.types, sections)
 
@@ -337,7 +330,6 @@ def record_colony(
     ticks: int = 0,
     frame_interval: int = 1,
     *,
-    world: int = 0,
     title: str = "",
     follow: int | None = None,
     progress: Callable[[float], None] | None = None,
@@ -354,7 +346,7 @@ def record_colony(
         AntsError: A number is not allowed, or no episode has begun.
     """
     between, done = intervals(colony, ticks, frame_interval, follow), 0
-    recorder = Recorder(colony, world, title, follow)
+    recorder = Recorder(colony, title, follow)
     frames = [recorder.snapshot()]
     for n in between:
         frames.append(recorder.tick(n))
@@ -381,7 +373,7 @@ def record_trace(trace: Trace, title: str = "") -> Recording:
     options: dict[str, Any] = {"sharing": "independent", "ends_at_delivery": True}
     colony = Colony(arguments.world, arguments.task, arguments.config, arguments.seed, 1, **options)
     colony.begin_episode(arguments.max_steps)
-    recorder, frames = Recorder(colony, 0, title, 0), []
+    recorder, frames = Recorder(colony, title, 0), []
     errors = np.zeros(len(trace)) if trace.td_errors is None else trace.td_errors
     for number, (step, error) in enumerate(zip(trace.steps.tolist(), errors, strict=True)):
         if step == 0 and number:

@@ -294,22 +294,20 @@ def free_cells(
     `queens` are the cells of queens, (nests, 3), `nests` are the nests of the ants, (n,).
     """
     index, n = np.flatnonzero(free), len(nests)
-    is_alone = where == "nest" and len(np.unique(nests)) == 1
-    if is_alone:
-        distance = grid.distances(tuple(queens[nests[0]].tolist()))[index]
-        # Only cells up to the distance of the n-th cell need a hash and an order.
+
+    def words(cells: np.ndarray) -> np.ndarray:
+        return stream_state(seed, STREAM_START_CELL, grid.number(grid.cells(cells)))
+
+    if where == "spread":
+        return index[np.argsort(words(index))[:n]]
+    queues = []
+    for queen in queens.tolist():
+        distance = grid.distances(tuple(queen))[index]
+        # Ants take at most the n nearest cells, so only these need a hash and an order.
         near = distance <= np.searchsorted(np.cumsum(np.bincount(distance)), n)
-        index, distance = index[near], distance[near]
-    words = stream_state(seed, STREAM_START_CELL, grid.number(grid.cells(index)))
-    if is_alone:
-        return index[np.lexsort((words, distance))[:n]]
-    if where == "spread" and n:
-        # The cells of the n smallest words are a sample without replacement.
-        first = np.argpartition(words, n - 1)[:n]
-        return index[first[np.argsort(words[first])]]
+        cells = index[near]
+        queues.append(iter(cells[np.lexsort((words(cells), distance[near]))].tolist()))
     taken: dict[int, None] = {}
-    far = (grid.distances(tuple(queen))[index] for queen in queens.tolist())
-    queues = [iter(index[np.lexsort((words, steps))].tolist()) for steps in far]
     for nest in nests.tolist():
         taken[next(cell for cell in queues[nest] if cell not in taken)] = None
     return np.fromiter(taken, np.int64, n)

@@ -127,17 +127,6 @@ def test_one_far_run_decides_the_mean_but_not_the_typical_run() -> None:
     assert share.by_mean is None
 
 
-def test_a_statistic_of_estimates_is_that_of_the_iqm() -> None:
-    """The difference of two estimates, near 0 and near 3, with a far run in the first."""
-    random = np.random.default_rng(0)
-    rows = random.normal(0, 0.1, size=(2, 40)) + np.array([[0.0], [3.0]])
-    rows[0, 7] = 900.0
-    contrast = Contrast("spread", rows, above(1.0), True, of_estimates=lambda c: c[1] - c[0])
-    (finding,) = judge([contrast])
-    assert finding.effect == pytest.approx(3.0, abs=0.1)
-    assert finding.by_mean.effect == pytest.approx(3 - 900 / 40, abs=0.1)
-
-
 def test_more_contrasts_at_once_need_wider_intervals() -> None:
     values = np.random.default_rng(0).normal(1, 1, 20)
     contrast = Contrast("a", values, above())

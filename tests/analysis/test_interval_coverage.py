@@ -84,17 +84,6 @@ def coverage_table(data: dict[str, np.ndarray], level: float | None, draws: int)
     return Table("", ["Of the last 50 episodes", "mean", "IQM", *headers], lines).markdown()
 
 
-def test_the_coverage_of_a_known_pool() -> None:
-    """Of a pool of 0s with one 1000 in fifty, 10 seeds have none in four of five draws."""
-    pool = np.zeros(4000)
-    pool[::50] = 1000
-    missed = 1 - coverage(pool, 10, iqm=False, draws=200)
-    assert missed > 0.98**10 - 0.15
-    assert coverage(pool, 10, iqm=True, draws=200) == 1
-    text = coverage_table({"made up": pool}, None, 20)
-    assert text.splitlines()[2].startswith("| made up | 20.00 | 0.00 | 0.")
-
-
 def test_the_level_that_is_tested_is_that_of_the_claims() -> None:
     levels = {one.level for findings in results().audit.values() for one in findings.values()}
     assert [round(level, 4) for level in levels] == [VERDICT_LEVEL]

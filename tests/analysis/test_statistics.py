@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from taichi_ants.analysis import statistics
 from taichi_ants.analysis.statistics import (
     _at_level,
     all_equal,
@@ -19,9 +18,7 @@ from taichi_ants.analysis.statistics import (
     estimates,
     interquartile_mean,
     interquartile_values,
-    jackknife_values,
     known_means,
-    resampling_counts,
     student_interval,
     without_noise,
 )
@@ -196,19 +193,6 @@ def test_a_row_with_nan_stays_alone() -> None:
 
 
 @pytest.mark.parametrize("iqm", [False, True])
-def test_resamples_that_are_too_many_to_be_kept_are_the_same(
-    iqm: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    values = np.random.default_rng(1).normal(size=(3, 60))
-    expected = bootstrap_interval(values, iqm=iqm)
-    resampling_counts.cache_clear()
-    monkeypatch.setattr(statistics, "_MOST_KEPT", 0)
-    monkeypatch.setattr(statistics, "_BLOCK_DRAWS", 1111)
-    np.testing.assert_array_equal(bootstrap_interval(values, iqm=iqm), expected)
-    assert resampling_counts.cache_info().currsize == 0
-
-
-@pytest.mark.parametrize("iqm", [False, True])
 @given(values=SAMPLES)
 def test_the_interval_stays_within_the_seeds_and_around_the_middle(
     iqm: bool, values: np.ndarray
@@ -246,38 +230,6 @@ def test_quantiles_are_those_of_the_sorted_rows(shape: str, levels: tuple[float,
 def test_all_equal_by_hand() -> None:
     values = np.array([[2.0, 2.0], [2.0, 2.0 + 1e-12], [2.0, 2.1], [0.0, 0.0], [np.nan, 1.0]])
     assert all_equal(values).tolist() == [True, True, False, True, False]
-
-
-def test_jackknife_values_of_a_mean_are_the_values() -> None:
-    values = np.array([3.0, 5.0, 10.0])
-    np.testing.assert_allclose(jackknife_values(lambda means: 2 * means, values), 2 * values)
-
-
-def test_jackknife_values_remove_the_bias_of_noise() -> None:
-    """Effects of 8 configurations that do not differ have no spread; single seeds seem to."""
-    random = np.random.default_rng(3)
-    plain, single, corrected = [], [], []
-    for _ in range(300):
-        noise = random.normal(5, 1, size=(8, 40))
-        plain.append(variance(noise.mean(axis=1)))
-        single.append(variance(noise).mean())
-        corrected.append(jackknife_values(variance, noise).mean())
-    assert np.mean(single) == pytest.approx(1.0, abs=0.02)
-    assert np.mean(plain) == pytest.approx(1 / 40, abs=0.003)
-    assert np.mean(corrected) == pytest.approx(0.0, abs=0.003)
-
-
-def variance(means: np.ndarray) -> np.ndarray:
-    return means.var(axis=0, ddof=1)
-
-
-def test_the_interval_of_jackknife_values_covers_the_statistic() -> None:
-    """Three true means with variance 1, 30 seeds of noise."""
-    noise = np.random.default_rng(4).normal(0, 1, size=(1500, 3, 30))
-    samples = noise + np.array([-1.0, 0.0, 1.0])[:, None]
-    values = np.stack([jackknife_values(variance, sample) for sample in samples])
-    low, high = bootstrap(values)
-    assert 0.92 < np.mean((low <= 1.0) & (high >= 1.0)) < 0.98
 
 
 def test_estimates_leave_out_seeds_without_a_value() -> None:

@@ -179,19 +179,26 @@ def test_figures_are_added_to_finished_results_without_new_runs(sweep, monkeypat
 WRONG = {
     "no kind": ('kind = "runs"', "", ["kind is None", "runs, colony"]),
     "no measure": (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
-    "unknown": ("shaping =", "shapings =", ["'task.rewards.shapings' is not a setting", "shaping"]),
-    "unknown key of the file": ("seeds =", "seds =", ["'seds' is not a setting", "one of seeds"]),
-    "other kind": ("rollouts", "ants", ["'ants' is not a setting of kind 'runs', but of 'colony'"]),
+    "unknown": (
+        "shaping =",
+        "shapings =",
+        ["`task.rewards.shapings` is not a setting; choose"],
+    ),
+    "unknown key of the file": ("seeds =", "seds =", ["'seds' is not a setting", "choose seeds"]),
+    "other kind": ("rollouts", "ants", ["'ants' is not a setting of a sweep of kind 'runs'"]),
     "missing": ("discount = 0.9", "", ["training.discount is missing"]),
     "value": ("discount = 0.9", "discount = 1.9", ["discount` is 1.9"]),
     "twice": ("discount", "epsilon = 0.1\ndiscount", ["training.epsilon is in [vary]"]),
     "empty": ("[1, 0]", "[]", ["task.rewards.shaping cannot vary, or has no values"]),
     "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "or a list of seeds"]),
-    "per seed": ("[task]", "[world]\nper_seed = true\n[task]", ["per_seed is true", 'is "runs"']),
+    "per seed": (
+        "[task]",
+        "[world]\nper_seed = true\n[task]",
+        ["per_seed is True", "for kind 'colony'"],
+    ),
     "for colonies": ("[vary]", "[vary]\ntask.life.regrowth = [1]", ["use a Colony"]),
     "against": ("[task]", "[against]\ntask.rewards.shaping = 7\n[task]", ["against is", "[vary]"]),
     "margin alone": ("seeds =", "margin = 1\nseeds =", ["which margin requires"]),
-    "measure twice": ('"greedy_deliveries"', '"return_last50"', ["'return_last50' more than once"]),
     "value twice": ("[1, 0]", "[1, 1]", ["task.rewards.shaping has 1 more than once"]),
     "few episodes": ("episodes = 50", "episodes = 49", ["return_last50 needs 50 episodes"]),
     "seed of one world": ("[task]", "[world]\nseed = 1\n[task]", ["world.seed has no effect on"]),
@@ -351,16 +358,16 @@ WRONG_EVENTS = {
         "learning_rate",
         ["in [[at]] number 1, in the evaluation, the ants"],
     ),
-    "one table": ("[[every]]", "[every]", ["write [[every]] in double brackets"]),
-    "number": ("at.1.remove", "at.2.remove", ["in [[at]] number 2, `at.tick` is missing"]),
-    "kind": ('kind = "colony"', 'kind = "runs"', ["is for kind 'colony'"]),
+    "one table": ("[[every]]", "[every]", ["[every] must be [[every]]"]),
+    "number": ("at.1.remove", "at.2.remove", ["the file has no table at.2; add it"]),
+    "kind": ('kind = "colony"', 'kind = "runs"', ["in a file of kind 'colony'"]),
 }
 
 
 def test_ranges_of_events_are_checked_and_whole(tmp_path):
     ranges = "at.1.tick = { from = 5, to = 50 }\nat.1.task.pheromone.level = { from = 3, to = 9 }"
     text = PROTOCOL.replace("tick = 20\n", "").replace("at.1.remove_ants = [0.0, 0.5]", ranges)
-    text = 'design = "latin_hypercube"\nsamples = 4\n' + text
+    text = 'design = "sobol"\nsamples = 4\n' + text
     (tmp_path / "my.toml").write_text(text)
     events = [one.protocol[0] for one in plan({"file": tmp_path / "my.toml"}).study.points]
     assert len({event.tick for event in events}) == 4
@@ -405,7 +412,7 @@ def test_settings_of_a_training_that_does_not_happen_are_refused():
             {"task": {"choice": "deneubourg"}, "evaluation_epsilon": 0.1},
             "evaluation_epsilon has no effect",
         ),
-        ({"kind": "runs", "evaluation_epsilon": 0.1}, "of kind 'runs', but of 'colony'"),
+        ({"kind": "runs", "evaluation_epsilon": 0.1}, "is not a setting of a sweep of kind 'runs'"),
     ],
 )
 def test_the_exploration_of_an_evaluation_is_checked(more, message):

@@ -125,7 +125,7 @@ def test_parameters_of_a_rule_vary_without_a_table(sweep, monkeypatch):
     rates = [one.task.rules["weaker"].rate for one in plan({"file": Path("my.toml")}).study.points]
     assert set(rates) == {0.1, 0.5}
     Path("my.toml").write_text(text.replace("rules.weaker", "rules.weakr"))
-    with pytest.raises(AntsError, match=r"no table \[task\.rules\.weakr\]; choose weaker, or add"):
+    with pytest.raises(AntsError, match=r"no table task\.rules\.weakr; add it"):
         plan({"file": Path("my.toml")})
 
 
@@ -184,7 +184,11 @@ training.learning_rate = [0.1, 0.2]
         ("episodes = 0", "episodes = 2", ["'trail_follower'", "set episodes = 0"]),
         ('"trail_follower"', '"none.npz"', ["cannot read 'none.npz'"]),
         ('"entropy", "deliveries", "path_length"', '"per_ant"', ["a measure that has a series"]),
-        ("[vary]", "[task.fields.home]\n[vary]\ntask.fields.hom.level = [1]", ["`task.fields.hom"]),
+        (
+            "[vary]",
+            "[task.fields.home]\n[vary]\ntask.fields.hom.level = [1]",
+            ["task.fields.hom; add"],
+        ),
     ],
 )
 def test_mistakes_end_in_one_sentence(old, new, words, sweep):

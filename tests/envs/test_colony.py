@@ -23,9 +23,9 @@ SUCCESSES = (Event.ENTERED_EMPTY, Event.ENTERED_CUE, Event.PICKED_UP, Event.DELI
 
 def several(drawn: RandomColony) -> ColonyWorlds:
     population = drawn.population
-    given = Arguments(drawn.world, 30, "index", None)
+    given = Arguments(drawn.world, drawn.task, 30, "index", None)
     which = population["ants"], population["start"], population["capacity"]
-    return ColonyWorlds(N_WORLDS, drawn.task, given, *which)
+    return ColonyWorlds(N_WORLDS, given, *which)
 
 
 def plain_one(worlds: ColonyWorlds, seed: int) -> ReferenceColony:
@@ -114,7 +114,7 @@ def test_each_ant_of_each_world_at_every_tick(rules):
 
 def test_what_the_mask_allows_succeeds_where_an_ant_is_alone():
     """And what it forbids fails."""
-    worlds = ColonyWorlds(1, None, Arguments(paper(), 100, "index", None), 1, "spread")
+    worlds = ColonyWorlds(1, Arguments(paper(), None, 100, "index", None), 1, "spread")
     seen = np.zeros((2, N_ACTIONS), int)
     rng = np.random.default_rng(4)
     worlds.begin(np.ones(1, bool), [0])

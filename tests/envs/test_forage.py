@@ -192,7 +192,7 @@ def test_wrong_arguments_are_named(arguments, told):
     with pytest.raises(AntsError) as caught:
         HexForageVectorEnv(**arguments)
     assert told in str(caught.value)
-    if not {"num_envs", "autoreset_mode", "max_episode_steps"} & arguments.keys():
+    if not {"num_envs", "autoreset_mode"} & arguments.keys():
         with pytest.raises(AntsError) as caught:
             HexForageEnv(**arguments)
         assert told in str(caught.value)
@@ -260,7 +260,6 @@ def test_worlds_and_tasks_by_name_path_and_value(tmp_path) -> None:
     def played(**arguments: Any) -> str:
         env = gymnasium.make(ID, **arguments)
         env.reset(seed=3)
-        assert env.unwrapped.max_steps == 600
         return str([env.step(action) for action in MAZE])
 
     for same in ({"world": path}, {"world": str(path)}, {"task": "paper"}, {"task": task.paper()}):

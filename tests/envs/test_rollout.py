@@ -12,12 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from taichi_ants import AntsError, Pheromone, Task, TrainingConfig, task, train, worlds
-from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.forage import HexForageVectorEnv
-from taichi_ants.envs.formats import FORMATS, ObservationFormat
+from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.rollout import Rollout
 from taichi_ants.learners.policies import action_probabilities, save_policy, trail_follower
-from taichi_ants.task import Life, Noise
+from taichi_ants.task import Noise
 
 SAME, NEXT, DISABLED = AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED
 MEADOWS = [worlds.open_world(seed, (8, 8, 8)) for seed in range(3)]
@@ -28,21 +27,10 @@ TASKS: dict[str, tuple[Task, ObservationFormat]] = {
     "misread": (Task(observation="trail_levels", noise=Noise(0.1, 0.2)), "index"),
 }
 
-COLONY_TASKS = {
-    "foraging": task.foraging(),
-    "truncates": task.foraging().replace(delivery="truncates", life=Life(regrowth=0)),
-    "noise": Task(delivery="truncates", noise=Noise(0.2, 0.1)),
-}
-
 
 def lone(n: int = 7, **options: Any) -> HexForageVectorEnv:
     given = {"world": MEADOWS, "max_steps": 15, "observation_format": "index"}
     return HexForageVectorEnv(n, **{**given, **options})
-
-
-def colony(n: int = 12, **options: Any) -> HexColonyVectorEnv:
-    given = {"world": MEADOWS[:2], "ants": 6, "max_steps": 15, "observation_format": "index"}
-    return HexColonyVectorEnv(n, **{**given, "task": task.foraging(), **options})
 
 
 def assert_steps(env: Any, made: Rollout) -> None:
@@ -134,9 +122,8 @@ def test_lone_ants_equal_steps(mode, before, lengths, seed, rules, delivery, eva
     compare(make, before, lengths, seed)
 
 
-@pytest.mark.parametrize("make", [lone, colony])
-def test_policies_choose_by_their_values(make):
-    env = make(task=task.foraging())
+def test_policies_choose_by_their_values():
+    env = lone(task=task.foraging())
     q_values = np.random.default_rng(0).choice([0, 1], (env._ants.task.n_states, 5)).astype(float)
     env.reset(seed=3)
     made = env.rollout(q_values, 400, epsilon=0.25)
@@ -152,20 +139,6 @@ def test_policies_choose_by_their_values(make):
     greedy = env.rollout(q_values, 100)
     best = q_values == q_values.max(axis=1, keepdims=True)
     assert best[greedy.observations[:-1], greedy.actions].all()
-
-
-@pytest.mark.parametrize("values", [[0.0], [0.0, 1.0], [0.0, 0.5, 1.0]])
-def test_ants_alone_and_in_colonies_draw_the_same_actions(values):
-    """A world in which no ant can meet another; both start with the same states."""
-    table = np.random.default_rng(0).choice(np.array(values, np.float32), (128, 5))
-    several = lone(6, world="paper", autoreset_mode=SAME)
-    one_each = colony(6, ants=1, world="paper", task=Task(), autoreset_mode=SAME)
-    made = []
-    for env in (several, one_each):
-        env.reset(seed=1)
-        made.append(env.rollout(table, 15, epsilon=0.3, seed=8))
-    assert np.array_equal(made[0].observations, made[1].observations)
-    assert np.array_equal(made[0].actions, made[1].actions)
 
 
 def test_forms_of_a_policy(tmp_path):
@@ -187,9 +160,8 @@ def test_forms_of_a_policy(tmp_path):
     assert not np.array_equal(made["result"].observations, made["name"].observations)
 
 
-@pytest.mark.parametrize("make", [lone, colony])
-def test_out_is_overwritten(make):
-    env, other = make(), make()
+def test_out_is_overwritten():
+    env, other = lone(), lone()
     for one in (env, other):
         one.reset(seed=2)
     first = env.rollout("random", 20)
@@ -200,15 +172,14 @@ def test_out_is_overwritten(make):
         assert np.array_equal(mine, its)
 
 
-@pytest.mark.parametrize("make", [lone, colony])
-def test_refuses(make, tmp_path):
-    env = make()
+def test_refuses():
+    env = lone()
     with pytest.raises(ResetNeeded, match=r"^no episode has begun; call reset\(\) before rollout"):
         env.rollout("random", 3)
     env.reset(seed=1)
     n, n_states = env.num_envs, env._ants.task.n_states
     before = env.rollout("random", 3)
-    where = env._ants.states().copy()
+    where = env._ants.batched.arrays["states"].copy()
     for error, message, policy, options in (
         (InvalidAction, rf"of shape \(1, {n}\)", np.zeros((0, n), int), {}),
         (InvalidAction, rf"\(3, 4\).*of shape \(3, {n}\)", np.zeros((3, 4), int), {}),
@@ -231,19 +202,7 @@ def test_refuses(make, tmp_path):
     ):
         with pytest.raises(error, match=message):
             env.rollout(policy, **options)
-    assert np.array_equal(env._ants.states(), where)
-
-
-@settings(max_examples=10, deadline=None)
-@given(rules=st.sampled_from(list(COLONY_TASKS)), form=st.sampled_from(FORMATS), **CASES)
-def test_colonies_equal_steps(mode, form, before, lengths, seed, rules):
-    if COLONY_TASKS[rules].delivery == "terminates":
-        mode = SAME
-
-    def make() -> HexColonyVectorEnv:
-        return colony(task=COLONY_TASKS[rules], autoreset_mode=mode, observation_format=form)
-
-    compare(make, before, lengths, seed)
+    assert np.array_equal(env._ants.batched.arrays["states"], where)
 
 
 @pytest.mark.parametrize("mode", [SAME, NEXT])

@@ -5,20 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Task, evaluate, rollout, tabulate, worlds
-from taichi_ants.envs.forage import HexForageEnv
+from taichi_ants import AntsError, evaluate, tabulate, worlds
 from taichi_ants.envs.formats import FORMATS, Shown
-from taichi_ants.learners.policies import Policy, trail_follower
+from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task import observations
 
 # Two that take the same greedy walk: without ties, so without chance.
 FOLLOWER = trail_follower() + 0.1 * np.linspace(1, 0, 5, dtype=np.float32)
-
-
-def network(seen: np.ndarray) -> np.ndarray:
-    """The follower as a function of one-hot vectors, as a network would be."""
-    states = Shown(observations.get("paper"), "one_hot").states(seen)
-    return FOLLOWER[states].astype(np.float64)
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -30,7 +23,8 @@ def test_a_function_gets_each_state_as_environments_show_it(observation: str, fo
     def function(seen: np.ndarray) -> np.ndarray:
         assert seen.dtype == shown.space.dtype
         assert all(one in shown.space for one in seen)
-        return values[shown.states(seen)]
+        assert np.array_equal(seen, shown.show(np.arange(len(values))))
+        return values
 
     table = tabulate(function, observation, form)
     assert table.dtype == np.float32
@@ -52,16 +46,6 @@ def test_a_function_gets_each_state_as_environments_show_it(observation: str, fo
 def test_what_a_function_may_not_return(returned, said) -> None:
     with pytest.raises(AntsError, match=said):
         tabulate(returned)
-
-
-def test_a_policy_acts_in_one_environment_as_in_a_rollout() -> None:
-    policy, rng = Policy(FOLLOWER, "paper", {}), np.random.default_rng(0)
-    trace = rollout(worlds.paper(), FOLLOWER, max_steps=40)
-    env = HexForageEnv(task=Task(evaporation_in_training=True), max_steps=40)
-    _, info = env.reset(seed=0)
-    for action in trace.actions:
-        assert policy.actions(info["state"], rng) == action
-        *_, info = env.step(policy.actions(info["state"], rng))
 
 
 def test_a_table_that_was_learned_outside_is_evaluated() -> None:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from command_lines import ROOT, numbers_in, run
+from model_script import table
 
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.rules import registry
-from taichi_ants.studies.model_script import table
 
 MODELS = ROOT / "experiments" / "models"
 

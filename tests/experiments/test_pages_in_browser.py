@@ -138,7 +138,6 @@ def test_details_open_one_by_one_or_at_once_and_stay_on_paper(opened):
     tab.locator(".statements summary").first.focus()
     tab.keyboard.press("Enter")
     assert "Tested on" in told.first.inner_text()
-    assert told.first.locator("svg.interval").first.bounding_box()["width"] > 200
     tab.locator(".statements summary").first.click()
     assert not told.first.is_visible()
     opener.click()

@@ -10,7 +10,7 @@ import pytest
 from paper.baselines import bound_rows, policy_rows
 from plain_runs import rollout
 
-from taichi_ants.analysis.bounds import episodes
+from taichi_ants.analysis import bounds as exact_bounds
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Rewards, Task
 from taichi_ants.worlds import paper
@@ -87,7 +87,7 @@ def test_all_baselines_are_paid_what_the_task_pays() -> None:
 
 
 def test_of_a_world_that_is_too_large_no_bounds_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(episodes, "MAX_STATES", 100)
+    monkeypatch.setattr(exact_bounds, "MAX_STATES", 100)
     [row] = bound_rows(paper(), Task(), max_steps=40)
     assert row.baseline == "exact bounds"
     assert "use a smaller world" in row.note

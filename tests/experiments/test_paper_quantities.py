@@ -7,8 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from paper.comparison import FIGURE_1, Q_LEARNING, SARSA
-from paper.quantities import READS, grids_of, rank_correlation, share_above
+from paper.quantities import (
+    READS,
+    ContrastOfEstimates,
+    grids_of,
+    jackknife_values,
+    rank_correlation,
+    share_above,
+)
 from synthetic_comparison import build, remeasured, subset, unchanged
+
+from taichi_ants.analysis.findings import above, judge
+from taichi_ants.analysis.statistics import bootstrap_interval
 
 AT_FIGURE_1, MEAN_OF_ALL = READS["at figure 1"], READS["mean of all"]
 
@@ -70,3 +80,43 @@ def test_the_rank_correlation_is_spearmans_within_each_seed() -> None:
     for seed in (0, 1):
         assert found[seed] == pytest.approx(spearmanr(returns[:, seed], steps[:, seed])[0])
     assert found[2] == 0
+
+
+def test_a_statistic_of_estimates_is_that_of_the_iqm() -> None:
+    """The difference of two estimates, near 0 and near 3, with a far run in the first."""
+    random = np.random.default_rng(0)
+    rows = random.normal(0, 0.1, size=(2, 40)) + np.array([[0.0], [3.0]])
+    rows[0, 7] = 900.0
+    contrast = ContrastOfEstimates(
+        *("spread", rows, above(1.0), True), of_estimates=lambda c: c[1] - c[0]
+    )
+    (finding,) = judge([contrast])
+    assert finding.effect == pytest.approx(3.0, abs=0.1)
+    assert finding.by_mean.effect == pytest.approx(3 - 900 / 40, abs=0.1)
+
+
+def test_jackknife_values_remove_the_bias_of_noise() -> None:
+    """Effects of 8 configurations that do not differ have no spread; single seeds seem to."""
+    random = np.random.default_rng(3)
+    plain, single, corrected = [], [], []
+    for _ in range(300):
+        noise = random.normal(5, 1, size=(8, 40))
+        plain.append(variance(noise.mean(axis=1)))
+        single.append(variance(noise).mean())
+        corrected.append(jackknife_values(variance, noise).mean())
+    assert np.mean(single) == pytest.approx(1.0, abs=0.02)
+    assert np.mean(plain) == pytest.approx(1 / 40, abs=0.003)
+    assert np.mean(corrected) == pytest.approx(0.0, abs=0.003)
+
+
+def variance(means: np.ndarray) -> np.ndarray:
+    return means.var(axis=0, ddof=1)
+
+
+def test_the_interval_of_jackknife_values_covers_the_statistic() -> None:
+    """Three true means with variance 1, 30 seeds of noise."""
+    noise = np.random.default_rng(4).normal(0, 1, size=(1500, 3, 30))
+    samples = noise + np.array([-1.0, 0.0, 1.0])[:, None]
+    values = np.stack([jackknife_values(variance, sample) for sample in samples])
+    low, high = bootstrap_interval(values, resamples=2000)
+    assert 0.92 < np.mean((low <= 1.0) & (high >= 1.0)) < 0.98

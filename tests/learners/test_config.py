@@ -30,12 +30,6 @@ def test_rates_fall_by_their_factors_down_to_their_least():
     assert epsilons == [0.8, 0.4, 0.3, 0.3]
 
 
-def test_other_mistakes():
-    with pytest.raises(AntsError) as caught:
-        TrainingConfig(**{**GOOD, "hyperparameters": 3})
-    assert str(caught.value) == "hyperparameters is 3; it must be a mapping of names to numbers."
-
-
 @pytest.mark.parametrize(
     ("learner", "name", "value", "says"),
     [

@@ -84,12 +84,12 @@ def test_edits_keep_colony_and_reference_equal(kernel):
         plain = ReferenceColony(*given, **rules)
         colony.begin_episode()
         plain.begin_episode()
-        interventions, plain_hand = Interventions(colony), PlainInterventions(plain)
+        interventions, twin = Interventions(colony), PlainInterventions(plain)
         for _ in range(30):
             edit = random_edit(rng, interventions)
             before = interventions.state()
             try:
-                apply_to_both(edit, interventions, plain_hand)
+                twin = apply_to_both(edit, interventions, twin)
                 (kind,) = edit
                 done[kind] = done.get(kind, 0) + 1
             except AntsError as error:

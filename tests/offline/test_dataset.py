@@ -68,7 +68,6 @@ def changed(data, name, row, value):
         ("state", 3, 128, "state of a data set contains 128; all must lie between 0 and 127"),
         ("action", 3, -1, "action of a data set contains -1"),
         ("run", -1, 3, "run of a data set contains 3"),
-        ("behaviour_probability", 3, 0.0, "behaviour_probability of a data set"),
         ("next_state", 3, 90, "are not in order"),
         ("truncated", -1, False, "are not in order"),
         ("agent", 3, 1, "are not in order"),

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from taichi_ants import runtime
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.rendering import Scene, Snapshot, at_start, colours, rasteriser, text
+from taichi_ants.rendering import Scene, Snapshot, at_start, colours, picture, text
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import Field, Food, Pheromone, Task
-from taichi_ants.worlds import World
+from taichi_ants.worlds import World, paper
 
 
 def index_at(rasteriser: Rasteriser, pixels: np.ndarray) -> np.ndarray:
@@ -166,11 +166,6 @@ def test_the_legend_shows_queens_ants_and_foods_in_their_colours(monkeypatch) ->
         written.clear()
 
 
-def test_ants_that_are_dots_have_the_colour_of_their_food() -> None:
-    dots = rasteriser.ants([[5, 5]] * 3, 0, np.array([1, 1, 0]), 2.0, load=colours.FOODS[[0, 2, 2]])
-    assert dots[:, 6].tolist() == [0x9A3F00, colours.FOODS[2], colours.ANT]
-
-
 def test_fields_have_scales_of_their_own() -> None:
     """A level that is the strongest of its field has the darkest colour, whatever the trail's."""
     world = World((4, 4, 4), (0, 0, 0))
@@ -256,27 +251,13 @@ def test_an_ant_points_where_it_is_heading(hexagon) -> None:
         assert np.linalg.norm(crumb - (crumb @ direction) * direction) < 0.15 * view.hexagon + 0.5
 
 
-def whole_scene() -> np.ndarray:
-    """A small world that has everything and no symmetry, without text."""
-    world = World(
-        ranges=(4, 6, 3),
-        queen=(0, 0, 0),
-        foods=[(3, 0, 0), (0, 5, 1)],
-        obstacles=[(0, 2, 0), (1, 2, 0), (0, 0, 2)],
-        trails=[((1, 0, 0), 250), ((2, 0, 0), 120), ((0, 3, 1), 25), ((0, 4, 1), 1)],
-        ants=[((1, 0, 0), 1), ((0, 3, 1), 4), ((3, 4, 0), 2)],
-    )
-    snapshot = dataclasses.replace(at_start(world, n=3), ant_carries=np.array([True, False, False]))
-    return Rasteriser(world.grid, 320, 200, margin=3).draw(snapshot)
-
-
 def test_the_number_of_threads_changes_nothing() -> None:
     before = runtime.start()
     try:
         pictures = []
         for threads in (1, 2):
             runtime.start(threads=threads)
-            pictures.append(whole_scene())
+            pictures.append(picture(paper(), (320, 200)))
         assert (pictures[0] == pictures[1]).all()
     finally:
         runtime.start(before.threads, before.arch)

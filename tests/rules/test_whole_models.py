@@ -21,7 +21,7 @@ from taichi_ants import AntsError, Colony
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.protocol import ProtocolEvent
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.protocol import Protocol
+from taichi_ants.reference.interventions import Protocol
 
 TICKS, EPISODES = 50, 2
 TRAIL = {"evaporation": "power_law", "half_life": None, "deposit": "weaker", "cap": None}

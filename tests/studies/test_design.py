@@ -1,4 +1,4 @@
-"""Designs: the points that they draw, and the files that describe them wrongly."""
+"""Designs: the points that they draw, wrong files, and indices of functions that are known."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from SALib.test_functions import Ishigami
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError
-from taichi_ants.studies.design import Choices, Design, Range
+from taichi_ants.studies.design import Design, Range, indices, report, seed_share, value_at
 from taichi_ants.studies.sweep import plan, sweep_of
 
 SHARES = st.floats(0, 1)
 AXES = {
     "a": Range(0.0, 1.0),
     "b": Range(1, 9, whole=True),
-    "c": Choices(("x", "y")),
-    "d": Choices((3,)),
+    "c": ["x", "y"],
+    "d": [3],
 }
 COLONY = """
 kind = "colony"
@@ -55,47 +56,39 @@ def ranges(draw):
 
 @given(ranges(), SHARES, SHARES)
 def test_values_lie_in_the_range_and_rise_with_the_share(one, share, other):
-    low, high = (one.at(each) for each in sorted((share, other)))
+    low, high = (value_at(one, each) for each in sorted((share, other)))
     assert one.low <= low <= high <= one.high
     assert isinstance(low, int) == one.whole
 
 
 @given(ranges())
 def test_a_range_has_both_ends(one):
-    ends = one.at(0.0), one.at(1.0)
+    ends = value_at(one, 0.0), value_at(one, 1.0)
     assert ends == pytest.approx((one.low, one.high), rel=1e-9)
     assert one.log or ends == (one.low, one.high)
 
 
 def test_scales_spread_values_as_they_say():
     shares = (np.arange(900) + 0.5) / 900
-    whole = [Range(1, 9, whole=True).at(share) for share in shares]
+    whole = [value_at(Range(1, 9, whole=True), share) for share in shares]
     assert np.bincount(whole).tolist() == [0, *[100] * 9]
-    assert Range(10.0, 1000.0, log=True).at(0.5) == pytest.approx(100)
-    assert Range(10.0, 1000.0).at(0.5) == 505
-    few = [Range(1, 64, log=True, whole=True).at(share) for share in shares]
+    assert value_at(Range(10.0, 1000.0, log=True), 0.5) == pytest.approx(100)
+    assert value_at(Range(10.0, 1000.0), 0.5) == 505
+    few = [value_at(Range(1, 64, log=True, whole=True), share) for share in shares]
     assert few.count(1) > 10 * few.count(32) > 0
-    assert [Choices("abc").at(share) for share in (0, 0.33, 0.34, 0.99, 1)] == [*"aabcc"]
+    assert [value_at("abc", share) for share in (0, 0.33, 0.34, 0.99, 1)] == [*"aabcc"]
 
 
-@pytest.mark.parametrize(
-    ("kind", "sensitivity"), [("sobol", False), ("sobol", True), ("random", False)]
-)
-def test_more_samples_keep_the_first_points(kind, sensitivity):
-    few, many = (Design(kind, n, 5, sensitivity).rows(AXES) for n in (8, 64))
+@pytest.mark.parametrize("sensitivity", [False, True])
+def test_more_samples_keep_the_first_points(sensitivity):
+    few, many = (Design("sobol", n, 5, sensitivity).rows(AXES) for n in (8, 64))
     assert few == many[: len(few)]
     assert len(few) == (8 * 5 if sensitivity else 8)
-    assert few == Design(kind, 8, 5, sensitivity).rows(AXES)
-    assert few != Design(kind, 8, 6, sensitivity).rows(AXES)
+    assert few == Design("sobol", 8, 5, sensitivity).rows(AXES)
+    assert few != Design("sobol", 8, 6, sensitivity).rows(AXES)
     if not sensitivity:
-        assert Design(kind, 11, 5).rows(AXES) == many[:11]
+        assert Design("sobol", 11, 5).rows(AXES) == many[:11]
     assert all(row["d"] == 3 and list(row) == ["a", "b", "c", "d"] for row in many)
-
-
-def test_a_latin_hypercube_has_a_point_in_each_part_of_each_setting():
-    shares = Design("latin_hypercube", 10, 1).shares(3)
-    assert np.sort((10 * shares).astype(int), axis=0).tolist() == [[n] * 3 for n in range(10)]
-    assert (shares == Design("latin_hypercube", 10, 1).shares(3)).all()
 
 
 def test_points_of_saltelli_differ_in_one_setting():
@@ -116,8 +109,6 @@ def test_the_points_of_a_file_are_built_from_drawn_values(tmp_path):
         assert point.task.pheromone.half_life == row["task.pheromone.half_life"]
         assert point.task.noise.slip == row["task.noise.slip"]
     assert sweep.facts()["design"] == {"design": "sobol", "design_seed": 0}
-    path.write_text(COLONY.replace('"sobol"', '"latin_hypercube"'), "utf-8")
-    assert plan({"file": path}).facts()["design"]["samples"] == 8
 
 
 def test_declared_whole_numbers_need_no_key():
@@ -130,28 +121,21 @@ def test_declared_whole_numbers_need_no_key():
 
 
 SLIP, HALF = "{ from = 0, to = 0.5 }", '{ from = 10, to = 1000, scale = "log" }'
+RANGE = "a range has the keys from and to"
 WRONG = {
-    "design": ('"sobol"', '"halton"', ["design is 'halton'", "latin_hypercube, sobol, random"]),
-    "samples": ("samples = 8", "", ["samples is None"]),
-    "samples of a grid": ('design = "sobol"', "", ["samples is for the designs latin_hypercube"]),
-    "reversed": (SLIP, "{ from = 0.5, to = 0 }", ["slip is from 0.5 to 0; both must be a number"]),
-    "key": (
-        SLIP,
-        "{ from = 0, too = 1 }",
-        ["a key of the range task.noise.slip is 'too'", "from, to, scale"],
-    ),
-    "text": (SLIP, '{ from = "a", to = 1 }', ["slip is from 'a' to 1"]),
-    "scale": (SLIP, '{ from = 0, to = 1, scale = "ln" }', ["slip.scale is 'ln'", "linear, log"]),
-    "log of 0": (
-        HALF,
-        '{ from = 0, to = 9, scale = "log" }',
-        ["half_life is from 0 to 9", "above 0 for the scale log"],
-    ),
+    "design": ('"sobol"', '"halton"', ["`design` is 'halton'", "one of grid, sobol"]),
+    "samples": ("samples = 8", "", ["samples is missing"]),
+    "samples of a grid": ('design = "sobol"', "", ["`samples` is 8; leave it out unless"]),
+    "reversed": (SLIP, "{ from = 0.5, to = 0 }", ["slip is {'from': 0.5, 'to': 0}", RANGE]),
+    "key": (SLIP, "{ from = 0, too = 1 }", ["slip is {'from': 0, 'too': 1}", RANGE]),
+    "text": (SLIP, '{ from = "a", to = 1 }', ["slip is {'from': 'a', 'to': 1}", RANGE]),
+    "scale": (SLIP, '{ from = 1, to = 2, scale = "ln" }', ["'scale': 'ln'", "linear or, if"]),
+    "log of 0": (HALF, '{ from = 0, to = 9, scale = "log" }', ["if both are above 0, log"]),
     "out of range": (SLIP, "{ from = 0, to = 1.5 }", ["noise.slip` is 1.5", "between 0 and 1"]),
     "whole": (
         f"task.noise.slip = {SLIP}",
         "capacity = { from = 1.5, to = 3 }",
-        ["must be a whole number"],
+        ["which are whole numbers"],
     ),
     "below 1": (
         f"task.noise.slip = {SLIP}",
@@ -164,8 +148,7 @@ WRONG = {
         ["has single values only"],
     ),
     "grid": ('design = "sobol"\nsamples = 8', "", ["half_life is a range, but a grid needs lists"]),
-    "sensitivity": ("sobol", "random", ["sensitivity = true with the design 'random'"]),
-    "not a power": ("samples = 8", "samples = 9", ["samples = 9", "a power of 2"]),
+    "not a power": ("samples = 8", "samples = 9\nsensitivity = true", ["a power of 2"]),
     "against": ("[task]", "against.task.noise.slip = 0\n[task]", ["with a grid, it must be"]),
 }
 
@@ -173,17 +156,64 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_mistakes_are_named(name):
     old, new, words = WRONG[name]
-    text = COLONY
-    if name in ("sensitivity", "not a power"):
-        text = text.replace("samples = 8", "samples = 8\nsensitivity = true")
-    assert old in text
+    assert old in COLONY
     with pytest.raises(AntsError) as error:
-        sweep_of(files.tomllib.loads(text.replace(old, new, 1)))
+        sweep_of(files.tomllib.loads(COLONY.replace(old, new, 1)))
     for word in words:
         assert word in str(error.value)
 
 
 def test_a_missing_extra_is_named_with_the_command(monkeypatch):
-    monkeypatch.setitem(sys.modules, "SALib", None)
+    monkeypatch.setitem(sys.modules, "SALib.sample.sobol", None)
     with pytest.raises(AntsError, match=r'pip install -e "\.\[sensitivity\]"'):
-        Design.of({"design": "sobol", "samples": 8, "sensitivity": True})
+        Design("sobol", 8, sensitivity=True).shares(2)
+
+
+NAMES = ("x1", "x2", "x3")
+# For a = 7 and b = 0.1, from the formulas of Ishigami and Homma (1990).
+FIRST, TOTAL = (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437)
+
+
+@pytest.fixture(scope="module")
+def ishigami():
+    shares = Design("sobol", 1024, 3, True).shares(3)
+    return Ishigami.evaluate((2 * shares - 1) * np.pi)
+
+
+def test_indices_of_ishigami(ishigami):
+    found = indices("y", NAMES, ishigami[:, None])
+    assert [row["setting"] for row in found] == list(NAMES)
+    for row, *exact in zip(found, FIRST, TOTAL, strict=True):
+        for name, value in zip(("first_order", "total"), exact, strict=True):
+            assert row[name] == pytest.approx(value, abs=0.02)
+            assert row[f"{name}_low"] < value < row[f"{name}_high"]
+        assert row["first_order_high"] - row["first_order_low"] < 0.25
+    again = indices("y", NAMES, ishigami[:, None])  # the same bootstrap
+    assert [[*row.values()][:8] for row in found] == [[*row.values()][:8] for row in again]
+    text = report(found, 1).splitlines()
+    assert [line.split()[1] for line in text[2:5]] == ["x1", "x2", "x3"]  # by their total index
+    assert text[2].endswith(" -")  # the share of one seed is unknown
+
+
+@pytest.mark.parametrize("variance", [0.0, 5.0, 200.0])
+def test_the_share_of_seeds(ishigami, variance):
+    """Noise of each run counts; what a seed adds to all points does not."""
+    random = np.random.default_rng(1)
+    seeds = 4
+    noise = random.normal(0, np.sqrt(variance), (len(ishigami), seeds))
+    values = ishigami[:, None] + noise + random.normal(0, 100, seeds)
+    expected = variance / seeds / (ishigami.var() + variance / seeds)
+    assert seed_share(values, NAMES) == pytest.approx(expected, rel=0.1, abs=1e-9)
+    found = indices("y", NAMES, values)
+    assert found[0]["seed_share"] == seed_share(values, NAMES)
+    of_nothing = found[1]["total"] - TOTAL[1] * (1 - expected)  # x2 interacts with nothing
+    assert of_nothing == pytest.approx(expected, abs=0.06)
+
+
+def test_constant_and_missing_values_have_no_indices(ishigami):
+    values = np.stack([ishigami, ishigami + 1], axis=1)
+    values[7] = ishigami[7], np.nan  # one of two seeds has a value
+    assert len(indices("y", NAMES, values)) == 3
+    values[7] = np.nan
+    assert indices("gaps", NAMES, values) == []
+    assert indices("flat", NAMES, 0 * ishigami[:15, None]) == []

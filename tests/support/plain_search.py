@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.episodes import ExpectedEpisode
+from taichi_ants.analysis.bounds import ExpectedEpisode
 from taichi_ants.task import Rewards
 from taichi_ants.worlds.world import World
 

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.live import edits
 from taichi_ants.reference.interventions import Interventions as PlainInterventions
+from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.task.constants import EMPTY
 
 KINDS = (
@@ -28,10 +30,7 @@ def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[
         return {kind: {"what": str(rng.choice(["rock", "food"])), "cells": some}}
     if kind == "trail":
         return {kind: {"level": int(rng.choice([0, 1, 20, 250, 9999])), "cells": some}}
-    if kind == "add_ants":
-        heading = int(rng.integers(6)) if rng.random() < 0.5 else None
-        return {kind: {"cells": some, "heading": heading}}
-    if kind in ("clear", "remove_ants"):
+    if kind in ("clear", "add_ants", "remove_ants"):
         return {kind: {"cells": some}}
     if kind == "queen":
         free = there[ground[there] == EMPTY] if rng.random() < 0.8 else there
@@ -54,10 +53,23 @@ def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[
 
 def apply_to_both(
     edit: dict[str, Any], interventions: Interventions, plain: PlainInterventions
-) -> None:
-    """Apply an edit to a colony and to its twin; raises AntsError if the world forbids it."""
+) -> PlainInterventions:
+    """Apply an edit to a colony and to its twin; raises AntsError if the world forbids it.
+
+    An episode begins in the world that the interventions have made, with new interventions.
+    """
     change: Any = edits.checked(edit, interventions)
     interventions.apply(change)
+    if "episode" in edit:
+        colony = plain.colony
+        colony.end_episode()
+        colony.n_ants = interventions.ants
+        for number in range(len(colony.streams), colony.n_ants):
+            state = stream_state(colony.seed, STREAM_ANT, number)
+            colony.streams.append(RandomStream(state))
+        colony.begin_episode(interventions.world())
+        return PlainInterventions(colony)
     if getattr(change, "cells", None):
         change = replace(change, cells=interventions.colony.grid.cells(change.cells).tolist())
     plain.apply(change)
+    return plain

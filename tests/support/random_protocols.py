@@ -70,8 +70,6 @@ def _intervention(
             short = "share" if isinstance(amount, float) else "number"
             amount = dict(amount) if isinstance(amount, dict) else {short: amount}
             amount["nest"] = int(rng.integers(world.n_nests))
-        if name == "add_ants" and isinstance(amount, dict) and rng.random() < 0.5:
-            amount["heading"] = int(rng.integers(6))
         return amount
     if name == "ants":
         return int(rng.integers(1, capacity + 1))

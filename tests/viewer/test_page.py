@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import base64
 import html
 import re
-import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-import taichi_ants
-from taichi_ants import Colony, TrainingConfig, World, commands, rollout, worlds
+from taichi_ants import commands, worlds
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import Episode
-from taichi_ants.task import Caste, Food, Task
-from taichi_ants.viewer import record_colony, record_trace
+from taichi_ants.viewer import page, record_trace
 from taichi_ants.viewer.page import part
 
 TITLE = 'An <ant> & its "trail"'
@@ -54,43 +49,11 @@ def test_text_can_be_read_and_ants_stand_out(theme):
     assert levels == sorted(levels, reverse=theme == 0)
 
 
-def test_notebooks_show_worlds_traces_and_colonies(monkeypatch):
-    """By IPython's formatter, to which the package tells it when it is imported."""
-    display = pytest.importorskip("IPython.core.formatters").DisplayFormatter()
-    shell = SimpleNamespace(display_formatter=display)
-    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
-    taichi_ants._show_pages_in_notebooks()
-
-    def html_of(value):
-        return display.format(value, include=["text/html"])[0].get("text/html")
-
-    trace = rollout(worlds.paper(), trail_follower())
-    shown = html_of(trace)
+def test_notebooks_show_recordings(episode):
+    shown = episode._repr_html_()
     assert shown.startswith("<iframe ")
-    inner = html.unescape(re.search(r'srcdoc="([^"]*)"', shown)[1])
-    assert inner.startswith("<!doctype html>")
-    assert inner.endswith("</html>\n")
-    object.__setattr__(trace, "arguments", None)
-    assert html_of(trace) is None
-    config = TrainingConfig("q_learning", 0.1, 0.9, 0.2, 1.0)
-    colony = Colony(worlds.paper(), None, config, ants=3)
-    assert html_of(colony) is None
-    colony.begin_episode()
-    assert "<iframe " in html_of(colony)
-    assert colony.ticks == 0
-    assert "<iframe " in html_of(record_colony(colony, ticks=2))
-    of_castes = Task(castes={"a": Caste()})
-    of_foods = Task(foods={"seed": Food(), "sap": Food()}, delivery="truncates")
-    for several in (of_castes, of_foods):
-        begun = Colony(worlds.paper(), several, config, ants=3)
-        begun.begin_episode()
-        assert "<iframe " in html_of(begun)
-    for world in (worlds.paper(), World((3, 4, 1), (0, 0, 0))):
-        alternative, source = re.findall(r'"([^"]*)"', html_of(world))
-        assert html.unescape(alternative) == repr(world)
-        content = base64.b64decode(source.removeprefix("data:image/png;base64,"))
-        assert content.startswith(b"\x89PNG")
-    assert html_of(World((600, 600, 1), (0, 0, 0))) is None
+    assert html.unescape(re.search(r'title="([^"]*)"', shown)[1]) == TITLE
+    assert html.unescape(re.search(r'srcdoc="([^"]*)"', shown)[1]) == page(episode)
 
 
 def test_the_command_writes_pages(tmp_path, capsys):

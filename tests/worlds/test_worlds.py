@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
-from hexagons import distance, neighbours
+from hexagons import neighbours
 from hypothesis import given
 from hypothesis import strategies as st
 
 from taichi_ants import worlds
 from taichi_ants.errors import AntsError
-from taichi_ants.grid.constants import STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.grid.randomness import stream_state
 from taichi_ants.reference.ants import starts
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds import World
@@ -62,53 +60,29 @@ def test_the_papers_world() -> None:
     assert world.reachable_foods().tolist() == [True]
 
 
-def test_listed_ants_start_first_and_where_listed() -> None:
-    world = small()
-    for n in (1, 2):
-        cells, headings = world.start(9, n)
-        assert world.grid.cells(cells).tolist() == [[1, 1, 0], [0, 0, 1]][:n]
-        assert headings.tolist() == [4, 2][:n]
-        assert cells.dtype == headings.dtype == np.int32
-
-
-@pytest.mark.parametrize("seed", [0, 1, -5, 2**70])
-def test_further_ants_start_nearest_to_the_queen_ties_by_the_stream(seed: int) -> None:
-    world = small(queen=(1, 0, 1), ants=[((1, 1, 0), 4)])
-    every = sorted(map(tuple, world.grid.cells(np.flatnonzero(world.grid.exists)).tolist()))
-    taken = {world.queen, (1, 1, 0), (2, 0, 0), (0, 2, 0), (0, 0, 2)}
-    order = sorted(
-        (int(distance(cell, world.queen)), stream_state(seed, STREAM_START_CELL, i), cell)
-        for i, cell in enumerate(every)
-        if cell not in taken
-    )
-    for n in (2, 5, 1 + len(order)):
-        cells, headings = world.start(seed, n)
-        assert world.grid.cells(cells[1:]).tolist() == [list(cell) for *_, cell in order[: n - 1]]
-        expected = [(stream_state(seed, STREAM_START_HEADING, i) >> 32) * 6 >> 32 for i in range(n)]
-        assert headings.tolist() == [4, *expected[1:]]
-    with pytest.raises(AntsError, match=f"room for {1 + len(order)}"):
-        world.start(seed, 2 + len(order))
-
-
+@pytest.mark.parametrize("where", WHERE)
 @pytest.mark.parametrize("seed", [0, -3, 2**70])
-def test_ants_that_are_spread_start_on_any_free_cells_by_the_seed(seed: int) -> None:
-    for world in (worlds.open_world(4, (9, 8, 7)), worlds.paper()):
-        free = int((world.ground() == EMPTY).sum())
-        for n in (1, 2, 40, free):
-            cells, headings = world.start(seed, n, "spread")
-            plain = starts(world, seed, n, "spread")
-            assert world.grid.cells(cells).tolist() == [list(cell) for cell, _ in plain]
-            assert headings.tolist() == [heading for _, heading in plain]
-            assert len(set(cells.tolist())) == n
-            assert (world.ground()[cells] == EMPTY).all()
-        with pytest.raises(AntsError, match=f"room for {free}"):
-            world.start(seed, free + 1, "spread")
+def test_ants_start_where_the_reference_says(seed: int, where: str) -> None:
+    """Listed ants first; the others near their queens, or on any free cells."""
+    two = World((5, 5, 5), [(0, 0, 0), (4, 0, 0)], ants=[((3, 0, 0), 2)])
+    for world in (small(), worlds.open_world(4, (9, 8, 7)), two):
+        room = int((world.ground() == EMPTY).sum())
+        for n in (1, 2, 9, room):
+            cells, headings = world.start(seed, n, where)
+            assert cells.dtype == headings.dtype == np.int32
+            given = list(zip(world.grid.cells(cells).tolist(), headings.tolist(), strict=True))
+            assert given == [([*cell], turn) for cell, turn in starts(world, seed, n, where)]
+        with pytest.raises(AntsError, match=f"room for {room}"):
+            world.start(seed, room + 1, where)
+
+
+def test_ants_start_around_the_queen_or_anywhere() -> None:
     world = World((60, 60, 60), (0, 0, 0))
-    near, far = (world.distances()[world.start(seed, 300, where)[0]] for where in WHERE)
+    near, far = (world.distances()[world.start(1, 300, where)[0]] for where in WHERE)
     assert near.max() == 10
     assert far.mean() == pytest.approx(world.distances()[world.grid.exists].mean(), rel=0.1)
     with pytest.raises(AntsError, match="where is 'moon'; it must be one of nest, spread"):
-        world.start(seed, 2, "moon")
+        world.start(1, 2, "moon")
 
 
 @st.composite

@@ -2,19 +2,17 @@
 
 Changes of single ants and of trails last for the present episode. Changes of rock, food and the
 queen persist in later episodes that `Interventions.begin_episode` starts; `Colony.begin_episode`
-starts from the colony's own worlds. After each method that changes cells or ants, the ants of these
-worlds observe again once, also if nothing has changed, but still take the actions that they have
-already drawn.
+starts from the colony's own worlds. After a change of cells or ants, the ants of these worlds
+observe again once, also if nothing has changed, but still take the actions that they have drawn.
 
 Rock, food and the queen move ants aside to empty cells up to `REACH` steps away. Candidate cells
 are tried by distance, then by cube coordinates. If none is empty, the ant and its cell do not
 change.
 
 Random numbers come from the stream of (seed, STREAM_INTERVENTION, episode) of each world, in the
-order of the changes. Adding n ants draws n headings and, with several castes, n castes, by the
-probabilities for newborn ants. Removing n of m living ants draws m words of 64 bits, one for each
-ant in the order of numbers, and removes the ants with the n smallest words. With a nest given, m
-counts the ants of that nest.
+order of the changes. Adding n ants draws n headings and, with several castes, n castes. Removing n
+of m living ants, or of those of a nest, draws a word of 64 bits for each of the m ants in order.
+The n ants with the smallest words go.
 """
 
 from __future__ import annotations
@@ -31,7 +29,7 @@ from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
-from taichi_ants.errors import AntsError, count, entries_of, refuse
+from taichi_ants.errors import AntsError, as_array, count
 from taichi_ants.grid.constants import (
     N_HEADINGS,
     STREAM_BORN,
@@ -72,12 +70,19 @@ class _World:
         self.queen_cells = self.colony.queen_cells[w]  # a view, (nests,)
 
     def place(self, change: language.Place) -> Change:
-        """Place rock or food; see `_put` and `_move_queen`."""
+        """Place rock or food, see `_put`, or move a queen to a cell without rock or food."""
         cells, foods = self._index(change.cells), list(self.colony.task.foods)
-        if change.what == "queen":
-            return self._move_queen(int(cells[0]), change.nest or 0)
-        kind = foods.index(change.kind) if change.kind else 0
-        return self._put(cells, _GROUNDS[change.what], kind)
+        if change.what != "queen":
+            kind = foods.index(change.kind) if change.kind else 0
+            return self._put(cells, _GROUNDS[change.what], kind)
+        if not self._can_be_free(cells[0]):
+            raise AntsError(
+                "the queen cannot move to cell "
+                f"{tuple(self.colony.grid.cells(cells[0]).tolist())}, because it is not empty; "
+                "choose an empty cell."
+            )
+        nest = change.nest or 0
+        return self._carry(self.queen_cells[nest], cells[0], QUEEN, nest)
 
     def clear(self, change: language.Clear) -> Change:
         """Remove rock and food."""
@@ -89,19 +94,17 @@ class _World:
         Has no effect if the first cell has none of them, or the other one is not free.
         """
         cell, to = flat_indices(self.colony.grid, change.cells)
-        what, colony = int(self.view("ground")[cell]), self.colony
+        what, number, loads = int(self.view("ground")[cell]), 0, None
         if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
             yield
-        elif what == QUEEN:
-            yield from self._move_queen(to, int(np.argmax(self.queen_cells == cell)))
-        else:
-            is_food = what == FOOD
-            kind = int(self.view("kind_of")[cell]) if is_food and colony.n_kinds > 1 else 0
-            loads = int(self.view("loads")[cell]) if is_food and colony.task.has_loads else None
-            yield from self._start_with([cell, to], [EMPTY, what | kind << _NUMBER])
-            self._step_aside(*self._aside(np.array([to])))
-            self._fill(np.array([cell]), EMPTY, 0)
-            self._fill(np.array([to]), what, kind, loads)
+            return
+        if what == QUEEN:
+            number = int(np.argmax(self.queen_cells == cell))
+        if what == FOOD and self.colony.n_kinds > 1:
+            number = int(self.view("kind_of")[cell])
+        if what == FOOD and self.colony.task.has_loads:
+            loads = int(self.view("loads")[cell])
+        yield from self._carry(cell, to, what, number, loads)
 
     def trail(self, change: language.SetTrail) -> Change:
         """Set the trail, or a further field, of cells other than rocks."""
@@ -114,13 +117,13 @@ class _World:
     def add_ants(self, change: language.AddAnts) -> Change:
         """Put newborn ants on free start cells, or on those of the cells given that are empty."""
         if change.cells is None:
-            return self._add_some(self._amount(change), change.heading, change.nest)
+            return self._add_some(self._amount(change), change.nest)
         cells = self._index(change.cells)
         grid, queens = self.colony.grid, self.colony.grid.cells(self.queen_cells).tolist()
         nests = np.argmin([grid.distances(tuple(queen))[cells] for queen in queens], axis=0)
         if change.nest is not None:
             nests = np.full(len(cells), change.nest)
-        return self._add(cells, nests, change.heading)
+        return self._add(cells, nests)
 
     def remove_ants(self, change: language.RemoveAnts) -> Change:
         """Remove random ants, or those on cells, with the food that they carry."""
@@ -135,18 +138,11 @@ class _World:
 
     def ants(self, change: language.SetAnts) -> Change:
         """Set the number of ants; new ants take free cells in the order of `World.start`."""
-        n, living = change.number, self._living_slots()
-        free = int(np.count_nonzero(self.view("ground") == EMPTY))
-        room = min(self.colony.capacity, free + len(living))
+        living = self._living_slots()
         if self.all.lasting:
-            room = min(room, int(np.count_nonzero(self.all.starts[self.w] == EMPTY)))
-        if n > room:
-            raise AntsError(f"ants is {n}, but there is room for {room}; choose fewer ants.")
-        if n >= len(living):
-            yield from self._add_some(n - len(living))
-        else:
-            yield
-            self._remove(living[n:])
+            self._check_room(self.all.starts[self.w], change.number)
+        yield from self._add_some(max(change.number - len(living), 0))
+        self._remove(living[change.number :])
 
     # Parts of changes
 
@@ -165,28 +161,16 @@ class _World:
         self._step_aside(ants, to)
         self._fill(there, what, kind)
 
-    def _move_queen(self, cell: int, nest: int) -> Change:
-        """Move the queen of a nest to a cell without rock or food; an ant there moves aside.
+    def _carry(
+        self, cell: int, to: int, what: int, number: int, loads: int | None = None
+    ) -> Change:
+        """Move what is in a cell to another one; see `_fill`."""
+        yield from self._start_with([cell, to], [EMPTY, what | number << _NUMBER])
+        self._step_aside(*self._aside(np.array([to])))
+        self._fill(np.array([cell]), EMPTY)
+        self._fill(np.array([to]), what, number, loads)
 
-        AntsError if the cell is not free.
-        """
-        grid, ground = self.colony.grid, self.view("ground")
-        if not self._can_be_free(cell):
-            raise AntsError(
-                f"the queen cannot move to cell {tuple(grid.cells(cell).tolist())}, because it is "
-                "not empty; choose an empty cell."
-            )
-        old = int(self.queen_cells[nest])
-        yield from self._start_with([old, cell], [EMPTY, QUEEN | nest << _NUMBER])
-        self._step_aside(*self._aside(np.array([cell])))
-        ground[old], ground[cell] = EMPTY, QUEEN
-        self.queen_cells[nest] = cell
-        closer = World(grid.ranges, grid.cells(cell).tolist()).closer()
-        self.view("closer").reshape(self.colony.n_nests, -1)[nest] = closer
-        self.colony.changed[self.w] = True
-        self._change_food_sources(np.array([cell]), QUEEN)
-
-    def _add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> Change:
+    def _add_some(self, n: int, nest: int | None = None) -> Change:
         """Put newborn ants on free start cells; without a nest, nests take turns.
 
         AntsError if there is too little room.
@@ -201,7 +185,7 @@ class _World:
         nests = np.resize(range(colony.n_nests) if nest is None else [nest], n)
         queens = grid.cells(self.queen_cells)
         cells = free_cells(grid, free, queens, nests, colony.seeds[self.w], colony.start)
-        return self._add(cells, nests, heading)
+        return self._add(cells, nests)
 
     def _index(self, cells: Sequence[Any] | str) -> np.ndarray:
         """Return the flat indices of cells, or of those of a region, without duplicates."""
@@ -238,12 +222,7 @@ class _World:
             return
         start = of_all.starts[self.w].copy()
         start[cells] = contents
-        ants, room = max(of_all.ants, colony.ants), np.count_nonzero(start == EMPTY)
-        if ants > room:
-            raise AntsError(
-                f"{count(ants, 'ant')} start each episode, but this change would leave "
-                f"{count(int(room), 'free cell')}; leave more cells free."
-            )
+        self._check_room(start, max(of_all.ants, colony.ants))
         if colony.learns and not (start & _CONTENT == FOOD).any():
             raise AntsError(
                 "this change would remove the last food item, but ants that learn need at least 1; "
@@ -252,20 +231,47 @@ class _World:
         yield
         of_all.starts[self.w], of_all.changed = start, True
 
-    def _fill(self, cells: np.ndarray, what: int, kind: int, loads: int | None = None) -> None:
-        """Make cells without ants and queens EMPTY, OBSTACLE or FOOD, by default with all loads."""
+    def _check_room(self, start: np.ndarray, ants: int) -> None:
+        """Raise an AntsError unless a number of ants have room at the start of later episodes."""
+        if ants > (room := np.count_nonzero(start == EMPTY)):
+            raise AntsError(
+                f"{count(ants, 'ant')} would start each later episode, but there would be "
+                f"{count(int(room), 'free cell')}; leave more cells free, or choose fewer ants."
+            )
+
+    def _fill(
+        self, cells: np.ndarray, what: int, number: int = 0, loads: int | None = None
+    ) -> None:
+        """Make cells without ants EMPTY, OBSTACLE or FOOD, by default with all loads, or one QUEEN.
+
+        `number` is the kind of the food, or the nest of the queen. See `food_sources.changed`.
+        """
+        colony, arrays, grid = self.colony, self.colony.arrays, self.colony.grid
         self.view("ground")[cells] = what
         self.view("walls")[cells] = what == OBSTACLE
-        self.colony.changed[self.w] = True
+        colony.changed[self.w] = True
         if what == OBSTACLE:
-            for number in range(len(self.colony.pheromones)):
-                self._lay(cells, 0, number)
-        if what == FOOD and self.colony.n_kinds > 1:
-            self.view("kind_of")[cells] = kind
-        if what == FOOD and self.colony.task.has_loads:
-            full = self.colony.arrays["food_numbers"][FoodRow.LOADS, kind]
+            for pheromone in range(len(colony.pheromones)):
+                self._lay(cells, 0, pheromone)
+        if what == QUEEN:
+            self.queen_cells[number] = cells[0]
+            closer = World(grid.ranges, grid.cells(cells[0]).tolist()).closer()
+            self.view("closer").reshape(colony.n_nests, -1)[number] = closer
+        if what == FOOD and colony.n_kinds > 1:
+            self.view("kind_of")[cells] = number
+        if what == FOOD and colony.task.has_loads:
+            full = arrays["food_numbers"][FoodRow.LOADS, number]
             self.view("loads")[cells] = full if loads is None else loads
-        self._change_food_sources(cells, what, kind)
+        if colony.model.food_changes:
+            room = colony.n_food_sources
+            sources = [food_sources.of_world(arrays, w, room) for w in range(len(colony.worlds))]
+            now = food_sources.changed(sources[self.w], cells, what, number, grid.offsets)
+            sources[self.w] = now
+            if now.shape[1] > room:
+                colony.read_start(now.shape[1])
+            arrays |= food_sources.arrays(
+                sources, arrays["worlds"], colony.n_food_sources, grid.size
+            )
 
     def _aside(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the slots of the ants on cells that can move aside, and their new cells."""
@@ -304,7 +310,7 @@ class _World:
         stored, clock = self.colony.stored_pheromone(self.w, number)
         stored[cells] = level + clock if level else 0
 
-    def _add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None) -> Change:
+    def _add(self, cells: np.ndarray, nests: np.ndarray) -> Change:
         """Put newborn ants of some nests on those of the cells that are empty."""
         colony, ground, rows = self.colony, self.view("ground"), self.rows
         free = ground[cells] == EMPTY
@@ -318,8 +324,7 @@ class _World:
         yield
         slots = np.flatnonzero(self.view("stage") == Stage.VACANT)[:n]
         numbers = rows[WorldRow.NEXT_NUMBER] + np.arange(n)
-        words = self.all.stream(self.w).bits(n) if heading is None else np.zeros(0, np.uint64)
-        headings = choose(words >> np.uint64(32), N_HEADINGS) if heading is None else heading
+        headings = choose(self.all.stream(self.w).bits(n) >> np.uint64(32), N_HEADINGS)
         episode = int(colony.arrays["episodes"][self.w])
         born = (episode << 32) + numbers.astype(np.int64)
         newborn: dict[str, Any] = {
@@ -355,21 +360,6 @@ class _World:
         self.rows[WorldRow.TOP] = np.max(np.flatnonzero(taken), initial=-1) + 1
         self.rows[WorldRow.FIRST_VACANT] = np.argmin(taken) if not taken.all() else len(taken)
 
-    def _change_food_sources(self, cells: np.ndarray, what: int, kind: int = 0) -> None:
-        """Let the food sources follow a change of cells; see `food_sources.changed`."""
-        colony, arrays, room = self.colony, self.colony.arrays, self.colony.n_food_sources
-        if colony.model.food_changes:
-            worlds = range(len(colony.worlds))
-            sources = [food_sources.of_world(arrays, w, room) for w in worlds]
-            offsets = colony.grid.offsets
-            now = food_sources.changed(sources[self.w], cells, what, kind, offsets)
-            sources[self.w] = now
-            if now.shape[1] > room:
-                colony.read_start(now.shape[1])
-            arrays |= food_sources.arrays(
-                sources, arrays["worlds"], colony.n_food_sources, colony.grid.size
-            )
-
 
 class Interventions:
     """Changes of some worlds of a colony, and of the start of their later episodes.
@@ -396,11 +386,10 @@ class Interventions:
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None
         n = len(colony.worlds)
-        numbers = range(n) if worlds is None else entries_of(worlds)
-        if not numbers or not all(isinstance(w, (int, np.integer)) and 0 <= w < n for w in numbers):
-            allowed = f"a list of one or more numbers from 0 to {n - 1}, or None for all worlds"
-            refuse("worlds", worlds, allowed)
-        self.worlds = tuple(dict.fromkeys(map(int, numbers)))
+        numbers = as_array(
+            "worlds", range(n) if worlds is None else worlds, "iu", (None,), 0, n - 1
+        )
+        self.worlds = tuple(dict.fromkeys(numbers.tolist()))
         self._first = colony.worlds
         self.starts = [_start_of(world) for world in colony.worlds] if lasting else []
         self._streams: dict[int, tuple[int, Stream]] = {}  # by world: the episode and its stream
@@ -429,14 +418,13 @@ class Interventions:
                 self.begin_episode()
             case language.SetTask():
                 self.set_task(change.changed(colony.task))
-            case language.SetEpsilon():
-                colony.epsilon = change.value
-                colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
-            case language.SetLearningRate():
-                colony.training = replace(
-                    colony.training, learning_rate_decay=1.0, min_learning_rate=0.0
-                )
-                colony.set_learning_rate(change.value)
+            case language.SetEpsilon() | language.SetLearningRate():
+                constant: dict[str, Any] = {f"{change.path}_decay": 1.0, f"min_{change.path}": 0.0}
+                colony.training = replace(colony.training, **constant)
+                if isinstance(change, language.SetEpsilon):
+                    colony.epsilon = change.value
+                else:
+                    colony.set_learning_rate(change.value)
             case _:
                 self._change(change)
 

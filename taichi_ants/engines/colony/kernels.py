@@ -16,6 +16,7 @@ from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
 from taichi_ants.engines.colony import columns, learning, life, own_inputs, steps, trail
+from taichi_ants.engines.colony.columns import function
 from taichi_ants.engines.colony.layout import (
     GAVE_UP,
     Barrier,
@@ -57,7 +58,9 @@ class Variant:
         self.can_rest = bool(self.at["rests"])
         self.entries = entries_of(model)
         own = own_inputs.own_rules(model.rules)
-        self.own_choice = model.choice_rule and own[model.choice_rule].choose
+        self.draw_by_cues = steps.draw_cell if model.choice == "deneubourg" else None
+        if model.choice_rule:
+            self.draw_by_cues = own[model.choice_rule].choose
         self.own_reward = model.reward_rule and own[model.reward_rule].pay
         deposits = [rule and own[rule].lay for rule in model.deposit_rules]
         evaporations = [rule and own[rule].evaporate for rule in model.evaporation_rules]
@@ -145,8 +148,8 @@ def last_phases(v: Variant) -> Iterator[Phase]:
     yield Phase(WORLD, life.end_tick)
 
 
-@ti.func
-def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
+@function
+def do(phase, c, v, chunk):
     """Do a phase for a chunk, or for the world `chunk`, unless its episode has ended."""
     w = chunk
     if ti.static(phase.of != WORLD):
@@ -166,8 +169,8 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
         phase.do(c, v, w, tick)
 
 
-@ti.func
-def is_taken(c: ti.template(), v: ti.template(), ant):
+@function
+def is_taken(c, v, ant):
     """Return whether an ant is in a slot; without vacant slots, always, while a kernel compiles."""
     taken = True
     if ti.static(v.slots_matter):
@@ -175,8 +178,8 @@ def is_taken(c: ti.template(), v: ti.template(), ant):
     return taken
 
 
-@ti.func
-def share_of(c: ti.template(), chunk, n):
+@function
+def share_of(c, chunk, n):
     """Return the range of a chunk among n ants or cells of a world."""
     each = (n + c.n_chunks - 1) // c.n_chunks
     first = chunk % c.n_chunks * each
@@ -206,8 +209,8 @@ def once(v: Variant, what: Callable[..., None], arguments: Any) -> Callable[...,
     return advance_colony
 
 
-@ti.func
-def wait_for_all(c: ti.template(), part, parts, number):
+@function
+def wait_for_all(c, part, parts, number):
     """Wait until all parts arrive at barrier `number`; return 0 if one does not arrive, else 1.
 
     The first part that starts decides: it opens the barrier once the others have arrived, or gives
@@ -239,8 +242,8 @@ def wait_for_all(c: ti.template(), part, parts, number):
     return goes_on
 
 
-@ti.func
-def read_ahead(c: ti.template()):
+@function
+def read_ahead(c):
     """Read all arguments before the loops of a kernel.
 
     Otherwise the compiler reads the numbers and the addresses of arrays again after each write into
@@ -279,8 +282,8 @@ def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
     if not v.plans_together:
         groups, last = shared_out(chain(tick_phases(v), last_phases(v))), []
 
-    @ti.func
-    def share(group: ti.template(), c: ti.template(), part, parts, at):
+    @function
+    def share(group: ti.template(), c, part, parts, at):
         """Do a part's share of group `at`, and wait; return the next group, or -1 to leave."""
         following = at
         if ti.static(not waits):

@@ -10,6 +10,7 @@ import taichi as ti
 
 from taichi_ants.arithmetic.random_bits import advance, draw_below
 from taichi_ants.engines.colony import columns, steps
+from taichi_ants.engines.colony.columns import function
 from taichi_ants.engines.colony.layout import CasteRow, Stage, SumRow, Tally
 from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.learners import model
@@ -22,23 +23,23 @@ from taichi_ants.task.rules.policy import best_actions
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
 
 
-@ti.func
-def see_anew(c: ti.template(), v: ti.template(), w, ant, tick):
+@function
+def see_anew(c, v, w, ant, tick):
     """Update the paper's state and the state index of an ant."""
     paper_state, state = steps.observe(c, v, w, ant, tick)
     note_seen(c, v, ant, paper_state, state)
 
 
-@ti.func
-def note_seen(c: ti.template(), v: ti.template(), ant, paper_state, state):
+@function
+def note_seen(c, v, ant, paper_state, state):
     """Store the paper's state and the state index of an ant."""
     columns.put(c.paper_state, ant, paper_state)
     if ti.static(not v.sees_paper_state):
         c.state[ant] = state
 
 
-@ti.func
-def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def begin(c, v, w, chunk, ant, tick):
     """Let an ant observe and its learner start an episode, unless its world is within one."""
     if tick == 0:
         if ti.static(v.misreads):
@@ -52,8 +53,8 @@ def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             born(ant_view(c, v, w, ant))
 
 
-@ti.func
-def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def see_interventions(c, v, w, chunk, ant, tick):
     """Let an ant observe after interventions; an ant that was just added becomes living."""
     if columns.trait(c.stage, ant) == Stage.NEWBORN:
         columns.put(c.stage, ant, Stage.LIVING)
@@ -64,8 +65,8 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     see_anew(c, v, w, ant, tick)
 
 
-@ti.func
-def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def observe_and_learn(c, v, w, chunk, ant, tick):
     """Observe, choose the next action if the learner needs it, and learn."""
     lives, marked = True, w * c.size + c.want[ant]
     if ti.static(v.ants_change):  # else no ant is born within a tick
@@ -105,8 +106,8 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         columns.put(c.next_action, ant, next_action)
 
 
-@ti.func
-def learns(c: ti.template(), v: ti.template(), ant):
+@function
+def learns(c, v, ant):
     """Return whether an ant learns; without castes, always, while a kernel compiles."""
     does = True
     if ti.static(v.n_castes > 0):
@@ -114,8 +115,8 @@ def learns(c: ti.template(), v: ti.template(), ant):
     return does
 
 
-@ti.func
-def rest(c: ti.template(), v: ti.template(), w, ant, acts, stops):
+@function
+def rest(c, v, w, ant, acts, stops):
     """Let an ant begin to rest if it `stops`; one without an action has the last action -1."""
     if not acts:
         columns.put(c.action, ant, -1)
@@ -127,14 +128,14 @@ def rest(c: ti.template(), v: ti.template(), w, ant, acts, stops):
         begin_to_learn(c, v, ant)
 
 
-@ti.func
-def memory_of(c: ti.template(), v: ti.template(), owner):
+@function
+def memory_of(c, v, owner):
     """Return the start of the tables and of the memory of a slot, or of a world and group."""
     return At(steps.table_of(c, v, owner), owner * c.floats_by_8 * 8, owner * c.integers_by_8 * 8)
 
 
-@ti.func
-def rates_of(c: ti.template(), v: ti.template(), caste):
+@function
+def rates_of(c, v, caste):
     """Return learning rate, discount, epsilon and the hyperparameters of the learner."""
     learning_rate, discount, epsilon = c.weights[1], c.discount, c.epsilon
     if ti.static(v.n_castes > 0):
@@ -144,15 +145,15 @@ def rates_of(c: ti.template(), v: ti.template(), caste):
     return v.read_rates(learning_rate, discount, epsilon, c.hyperparameters, 0)
 
 
-@ti.func
-def own_number(c: ti.template(), caste, row: ti.template(), default):
+@function
+def own_number(c, caste, row, default):
     """Return a number of a caste as f32, or `usual` if it has none."""
     value = c.castes[row, caste]
     return ti.select(value >= 0.0, ti.cast(value, ti.f32), default)
 
 
-@ti.func
-def caste_of(c: ti.template(), v: ti.template(), ant):
+@function
+def caste_of(c, v, ant):
     """Return the caste of an ant, 0 without castes."""
     caste = 0
     if ti.static(v.n_castes > 0):
@@ -160,16 +161,16 @@ def caste_of(c: ti.template(), v: ti.template(), ant):
     return caste
 
 
-@ti.func
-def begin_to_learn(c: ti.template(), v: ti.template(), ant):
+@function
+def begin_to_learn(c, v, ant):
     """Let the learner of an ant with its own table start an episode."""
     if ti.static(v.begins):
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
         v.learner.begin(memory, memory_of(c, v, ant))
 
 
-@ti.func
-def reset_slot(c: ti.template(), v: ti.template(), ant):
+@function
+def reset_slot(c, v, ant):
     """Reset the tables and the memory of a slot for a newborn ant."""
     at = memory_of(c, v, ant)
     for i in range(at.table, steps.table_of(c, v, ant + 1)):
@@ -181,8 +182,8 @@ def reset_slot(c: ti.template(), v: ti.template(), ant):
     begin_to_learn(c, v, ant)
 
 
-@ti.func
-def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick, stops):
+@function
+def learn_alone(c, v, ant, seen, next_action, tick, stops):
     """Update the ant's own table, as if it were alone; its episode ends if it `stops`."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
     event = columns.trait(c.event, ant)
@@ -203,10 +204,8 @@ def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick
     )
 
 
-@ti.func
-def error_of(
-    c: ti.template(), v: ti.template(), w, pair, reward, terminated, seen, next_action
-):  # fmt: skip
+@function
+def error_of(c, v, w, pair, reward, terminated, seen, next_action):
     """Return the TD error of a pair by the table of its group; see `place_in_tables`."""
     table = steps.table_of(c, v, w * v.n_groups + group_of_pair(v, pair))
     value, rates = place_in_tables(c, v, w, pair), rates_of(c, v, caste_of_pair(v, pair))
@@ -223,8 +222,8 @@ def error_of(
     return error
 
 
-@ti.func
-def group_of_pair(v: ti.template(), pair):
+@function
+def group_of_pair(v, pair):
     """Return the group of a pair, whose number is its place in the tables of all groups in turn."""
     group = 0
     if ti.static(v.n_groups > 1):
@@ -232,21 +231,21 @@ def group_of_pair(v: ti.template(), pair):
     return group
 
 
-@ti.func
-def caste_of_pair(v: ti.template(), pair):
+@function
+def caste_of_pair(v, pair):
     """Return the caste of the ants that learn about a pair, 0 without castes."""
     return group_of_pair(v, pair) % ti.static(max(1, v.n_castes))
 
 
-@ti.func
-def place_in_tables(c: ti.template(), v: ti.template(), w, pair):
+@function
+def place_in_tables(c, v, w, pair):
     """Return the index in `q` of the value of a pair of a world."""
     group = group_of_pair(v, pair)
     return steps.table_of(c, v, w * v.n_groups + group) + pair - group * v.n_numbers
 
 
-@ti.func
-def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_action):
+@function
+def share_error(c, v, w, chunk, ant, seen, next_action):
     """Add the TD error and the transition of an ant to the sums of its chunk."""
     event = columns.trait(c.event, ant)
     reward = ti.cast(steps.reward_of(c, v, ant), ti.f32)
@@ -266,14 +265,14 @@ def fixed(error):
     return ti.cast(ti.floor(ti.cast(error, ti.f64) * _ONE + 0.5), ti.i64)
 
 
-@ti.func
-def list_of(v: ti.template(), chunk):
+@function
+def list_of(v, chunk):
     """Return the start of a chunk's list in `touched`: the number of pairs, then the pairs."""
     return (v.n_pairs + 1) * chunk
 
 
-@ti.func
-def add_to_sums(c: ti.template(), v: ti.template(), chunk, pair, error, total, count):
+@function
+def add_to_sums(c, v, chunk, pair, error, total, count):
     """Add `count` updates of a pair to a chunk's sums, the last of them with this error."""
     entry, listed = v.n_pairs * chunk + pair, list_of(v, chunk)
     known, n = c.sums_of[SumRow.COUNT, entry], c.touched[listed]
@@ -290,16 +289,16 @@ def add_to_sums(c: ti.template(), v: ti.template(), chunk, pair, error, total, c
     c.errors[entry] = error
 
 
-@ti.func
-def note_transition(c: ti.template(), entry, number, transition):
+@function
+def note_transition(c, entry, number, transition):
     """Store the transition of a pair for the model if its ant has the highest number so far."""
     if number > c.sums_of[SumRow.LATEST, entry]:
         c.sums_of[SumRow.LATEST, entry] = number
         c.sums_of[SumRow.TRANSITION, entry] = transition
 
 
-@ti.func
-def learn_together(c: ti.template(), v: ti.template(), w, tick):
+@function
+def learn_together(c, v, w, tick):
     """Update the table of a world by the errors of all its ants."""
     join_sums(c, v, w)
     if ti.static(v.learner.plans):
@@ -307,8 +306,8 @@ def learn_together(c: ti.template(), v: ti.template(), w, tick):
     apply_sums(c, v, w)
 
 
-@ti.func
-def join_sums(c: ti.template(), v: ti.template(), w):
+@function
+def join_sums(c, v, w):
     """Add the sums of all chunks of a world to those of the first chunk."""
     first = w * c.n_chunks
     for chunk in range(first + 1, first + c.n_chunks):
@@ -328,8 +327,8 @@ def join_sums(c: ti.template(), v: ti.template(), w):
         c.touched[listed] = 0
 
 
-@ti.func
-def remember_shared(c: ti.template(), v: ti.template(), w):
+@function
+def remember_shared(c, v, w):
     """Store the joined transitions in the shared model, new pairs in ascending order."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
     chunk = w * c.n_chunks
@@ -350,8 +349,8 @@ def remember_shared(c: ti.template(), v: ti.template(), w):
         model.remember(memory, at, pair - group * v.n_numbers, transition)
 
 
-@ti.func
-def apply_sums(c: ti.template(), v: ti.template(), w):
+@function
+def apply_sums(c, v, w):
     """Update the shared values of a world by the joined sums, and reset the sums."""
     chunk = w * c.n_chunks
     listed = list_of(v, chunk)
@@ -369,15 +368,15 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
     c.touched[listed] = 0
 
 
-@ti.func
-def note_best_actions(c: ti.template(), entry):
+@function
+def note_best_actions(c, entry):
     """Store the best actions of a state, of which one value is at a place in `q`."""
     row = entry & -ROW
     c.q[row + BEST_AT] = ti.cast(best_actions(values_of(c.q, row, 0)), ti.f32)
 
 
-@ti.func
-def weight_of(c: ti.template(), v: ti.template(), pair, count):
+@function
+def weight_of(c, v, pair, count):
     """Return the weight of the mean of some errors in an update of a pair; see `update_weights`."""
     weight = c.weights[ti.min(count, c.weights.shape[0] - 1)]  # the last is for more errors
     if ti.static(v.n_castes > 0):
@@ -387,8 +386,8 @@ def weight_of(c: ti.template(), v: ti.template(), pair, count):
     return weight
 
 
-@ti.func
-def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def draw_pair(c, v, w, chunk, ant, tick):
     """Draw a visited pair for a planning update of an ant."""
     acted = columns.trait(c.stage, ant) != Stage.NEWBORN
     if ti.static(v.can_rest):
@@ -403,8 +402,8 @@ def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         note_transition(c, v.n_pairs * chunk + pair, 0, transition)
 
 
-@ti.func
-def plan_together(c: ti.template(), v: ti.template(), w, tick):
+@function
+def plan_together(c, v, w, tick):
     """Update the pairs that ants drew for planning, by the table before this round of updates."""
     join_sums(c, v, w)
     chunk = w * c.n_chunks

@@ -8,7 +8,7 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below, high_word, stream_of
-from taichi_ants.engines.colony.columns import put, trait
+from taichi_ants.engines.colony.columns import function, put, trait
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
@@ -31,8 +31,8 @@ from taichi_ants.task.events import Event
 from taichi_ants.task.rules.policy import bit_number
 
 
-@ti.func
-def count(c: ti.template(), v: ti.template(), w, tick):
+@function
+def count(c, v, w, tick):
     """Add the tallies of all chunks to the counts of a world, and reset them."""
     # No `+=`, which would be atomic and slower: one thread processes a world.
     gives = 0
@@ -60,8 +60,8 @@ def count(c: ti.template(), v: ti.template(), w, tick):
         c.worlds[WorldRow.FIRST_DELIVERY, w] = tick + 1
 
 
-@ti.func
-def count_by_nest(c: ti.template(), v: ti.template(), w):
+@function
+def count_by_nest(c, v, w):
     """Add the deliveries of all chunks by nest and kind to those of a world, and reset them."""
     for nest in ti.static(range(v.n_nests)):
         column, of_nest = w * v.n_nests + nest, 0
@@ -77,8 +77,8 @@ def count_by_nest(c: ti.template(), v: ti.template(), w):
             delivered(nest_view(c, v, w, nest), of_nest)
 
 
-@ti.func
-def count_by_caste(c: ti.template(), v: ti.template(), w):
+@function
+def count_by_caste(c, v, w):
     """Add the deliveries of all chunks by caste to those of a world, and reset them."""
     for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
         for i in range(v.n_castes):
@@ -86,8 +86,8 @@ def count_by_caste(c: ti.template(), v: ti.template(), w):
             c.delivered_by_caste[chunk * MAX_CASTES + i] = 0
 
 
-@ti.func
-def free_around(c: ti.template(), base, cell):
+@function
+def free_around(c, base, cell):
     """Return a bit for each heading at which the neighbour of a cell is empty."""
     free = 0
     for heading in ti.static(range(N_HEADINGS)):
@@ -96,42 +96,38 @@ def free_around(c: ti.template(), base, cell):
     return free
 
 
-@ti.func
-def give_birth(c: ti.template(), v: ti.template(), w, tick):
+@function
+def give_birth(c, v, w, tick):
     """Turn stored food into ants next to the queens, while slots and cells are free."""
+    base = w * c.size
     for nest in range(v.n_nests):
-        give_birth_in(c, v, w, nest)
-
-
-@ti.func
-def give_birth_in(c: ti.template(), v: ti.template(), w, nest):
-    """Turn stored food of a nest into ants next to its queen."""
-    base, column = w * c.size, w * v.n_nests + nest
-    queen = c.nests[NestRow.QUEEN_CELL, column]
-    free = free_around(c, base, queen)
-    while (
-        c.nests[NestRow.STORE, column] > 0
-        and c.worlds[WorldRow.LIVING, w] < c.n_slots
-        and free != 0
-    ):
-        k, c.queen_streams[w] = draw_below(c.queen_streams[w], popcnt(free))
-        heading = bit_number(free, k)
-        slot = c.worlds[WorldRow.FIRST_VACANT, w]
-        while trait(c.stage, w * c.n_slots + slot) != Stage.VACANT:
-            slot += 1
-        c.worlds[WorldRow.FIRST_VACANT, w] = slot + 1
-        c.worlds[WorldRow.TOP, w] = ti.max(c.worlds[WorldRow.TOP, w], slot + 1)
-        if ti.static(v.n_castes > 0):
-            put(c.caste, w * c.n_slots + slot, draw_caste(c, v, w, nest))
-        place_newborn(c, v, w, nest, w * c.n_slots + slot, queen + c.compass[heading + 1], heading)
-        if ti.static(v.independent):
-            reset_slot(c, v, w * c.n_slots + slot)
-        c.nests[NestRow.STORE, column] -= 1
+        column = w * v.n_nests + nest
+        queen = c.nests[NestRow.QUEEN_CELL, column]
         free = free_around(c, base, queen)
+        while (
+            c.nests[NestRow.STORE, column] > 0
+            and c.worlds[WorldRow.LIVING, w] < c.n_slots
+            and free != 0
+        ):
+            k, c.queen_streams[w] = draw_below(c.queen_streams[w], popcnt(free))
+            heading = bit_number(free, k)
+            slot = c.worlds[WorldRow.FIRST_VACANT, w]
+            while trait(c.stage, w * c.n_slots + slot) != Stage.VACANT:
+                slot += 1
+            c.worlds[WorldRow.FIRST_VACANT, w] = slot + 1
+            c.worlds[WorldRow.TOP, w] = ti.max(c.worlds[WorldRow.TOP, w], slot + 1)
+            ant = w * c.n_slots + slot
+            if ti.static(v.n_castes > 0):
+                put(c.caste, ant, draw_caste(c, v, w, nest))
+            place_newborn(c, v, w, nest, ant, queen + c.compass[heading + 1], heading)
+            if ti.static(v.independent):
+                reset_slot(c, v, ant)
+            c.nests[NestRow.STORE, column] -= 1
+            free = free_around(c, base, queen)
 
 
-@ti.func
-def draw_caste(c: ti.template(), v: ti.template(), w, nest):
+@function
+def draw_caste(c, v, w, nest):
     """Return the caste of a newborn ant of a nest, drawn from the queen's stream if needed."""
     caste = 0
     if ti.static(v.n_castes > 1):
@@ -143,8 +139,8 @@ def draw_caste(c: ti.template(), v: ti.template(), w, nest):
     return caste
 
 
-@ti.func
-def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, heading):
+@function
+def place_newborn(c, v, w, nest, ant, cell, heading):
     """Put a newborn ant into a slot and onto a cell."""
     number = c.worlds[WorldRow.NEXT_NUMBER, w]
     c.cell[ant] = cell
@@ -171,8 +167,8 @@ def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, headin
     c.worlds[WorldRow.BIRTHS, w] += 1
 
 
-@ti.func
-def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def grow_old(c, v, w, chunk, ant, tick):
     """Let an ant grow old; if it dies, empty its cell, or leave its food there."""
     if trait(c.stage, ant) == Stage.LIVING:
         dies = False
@@ -191,107 +187,89 @@ def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
                     c.loads[index] = 1
 
 
-@ti.func
-def regrow(c: ti.template(), v: ti.template(), w, tick):
+@function
+def regrow(c, v, w, tick):
     """Let food grow back in empty cells of food sources that have waited long enough."""
-    base = w * c.size
-    for source in range(
-        w * c.n_food_sources, w * c.n_food_sources + c.worlds[WorldRow.FOOD_SOURCES, w]
-    ):
+    first = w * c.n_food_sources
+    for source in range(first, first + c.worlds[WorldRow.FOOD_SOURCES, w]):
         taken = c.food_sources[FoodSourceRow.TAKEN, source]
         waits, kind = c.regrowth, 0
         if ti.static(v.n_kinds > 1):
             kind = c.food_sources[FoodSourceRow.KIND, source]
         if ti.static(v.has_foods):
             waits = c.food_numbers[FoodRow.REGROWTH, kind]
-        if waits >= 0 and taken >= 0 and tick >= taken + waits:
-            index = base + c.food_sources[FoodSourceRow.CELL, source]
-            if c.ground[index] == EMPTY:
-                c.ground[index] = FOOD
-                grown = 1
-                if ti.static(v.n_kinds > 1):
-                    c.kind_of[index] = ti.cast(kind, ti.u8)
-                if ti.static(v.has_loads):
-                    grown = c.food_numbers[FoodRow.LOADS, kind]
-                    c.loads[index] = grown
-                c.source_of[index] = source
-                c.food_sources[FoodSourceRow.TAKEN, source] = -1
-                c.worlds[WorldRow.REGROWN, w] += grown
+        index = place_of(c, w, source)
+        if waits >= 0 and taken >= 0 and tick >= taken + waits and c.ground[index] == EMPTY:
+            grown = 1
+            if ti.static(v.n_kinds > 1):
+                c.kind_of[index] = ti.cast(kind, ti.u8)
+            if ti.static(v.has_loads):
+                grown = c.food_numbers[FoodRow.LOADS, kind]
+                c.loads[index] = grown
+            c.ground[index] = FOOD
+            c.source_of[index] = source
+            c.food_sources[FoodSourceRow.TAKEN, source] = -1
+            c.worlds[WorldRow.REGROWN, w] += grown
 
 
-@ti.func
-def move_piles(c: ti.template(), v: ti.template(), w, tick):
+@function
+def place_of(c, w, source):
+    """Return the place of a food source in the arrays of cells."""
+    return w * c.size + c.food_sources[FoodSourceRow.CELL, source]
+
+
+@function
+def move_piles(c, v, w, tick):
     """Move every pile, every `c.pile_move_interval` ticks."""
     if c.pile_move_interval > 0:
         if (tick + 1) % c.pile_move_interval == 0:
             for pile in range(c.worlds[WorldRow.PILES, w]):
-                move_pile(c, w, pile)
+                move_pile(c, w, w * (c.n_food_sources + 1) + pile)
 
 
-@ti.func
-def move_pile(c: ti.template(), w, pile):
+@function
+def move_pile(c, w, pile):
     """Move a pile: all food that can move leaves its cells, then enters the next ones.
 
     So the front of a pile makes way for the food behind it, in any order of the food sources.
     """
     heading, c.queen_streams[w] = draw_below(c.queen_streams[w], N_HEADINGS)
-    step = c.compass[heading + 1]
-    begins = w * (c.n_food_sources + 1) + pile
-    for i in range(c.piles[begins], c.piles[begins + 1]):
-        source = listed_source(c, w, i)
+    step, first = c.compass[heading + 1], w * c.n_food_sources
+    for i in range(first + c.piles[pile], first + c.piles[pile + 1]):
+        source = first + c.food_sources[FoodSourceRow.LISTED, i]
         c.food_sources[FoodSourceRow.MOVES, source] = ti.cast(can_move(c, w, source, step), ti.i32)
-    for i in range(c.piles[begins], c.piles[begins + 1]):
-        source = listed_source(c, w, i)
-        if (
-            c.food_sources[FoodSourceRow.MOVES, source] == 1
-            and c.food_sources[FoodSourceRow.TAKEN, source] < 0
-        ):
-            index = w * c.size + c.food_sources[FoodSourceRow.CELL, source]
-            c.ground[index] = EMPTY
-            c.source_of[index] = -1
-    for i in range(c.piles[begins], c.piles[begins + 1]):
-        source = listed_source(c, w, i)
-        if c.food_sources[FoodSourceRow.MOVES, source] == 1:
-            c.food_sources[FoodSourceRow.CELL, source] += step
-            if c.food_sources[FoodSourceRow.TAKEN, source] < 0:
-                index = w * c.size + c.food_sources[FoodSourceRow.CELL, source]
-                c.ground[index] = FOOD
-                c.source_of[index] = source
+    for enters in ti.static((False, True)):
+        for i in range(first + c.piles[pile], first + c.piles[pile + 1]):
+            source = first + c.food_sources[FoodSourceRow.LISTED, i]
+            if c.food_sources[FoodSourceRow.MOVES, source] == 1:
+                if ti.static(enters):
+                    c.food_sources[FoodSourceRow.CELL, source] += step
+                if c.food_sources[FoodSourceRow.TAKEN, source] < 0:
+                    index = place_of(c, w, source)
+                    c.ground[index] = FOOD if ti.static(enters) else EMPTY
+                    c.source_of[index] = source if ti.static(enters) else -1
 
 
-@ti.func
-def listed_source(c: ti.template(), w, i):
-    """Return the column in `food_sources` of the i-th food source in the order of piles."""
-    return w * c.n_food_sources + c.food_sources[FoodSourceRow.LISTED, w * c.n_food_sources + i]
-
-
-@ti.func
-def can_move(c: ti.template(), w, source, step):
+@function
+def can_move(c, w, source, step):
     """Return whether a food source can move by a step.
 
     A source with food can move if the cell ahead is empty, or has food of the same pile that can
     move: food in a row moves together. A waiting source can move unless rock or queen is ahead.
     """
-    ahead = w * c.size + c.food_sources[FoodSourceRow.CELL, source] + step
+    ahead = place_of(c, w, source) + step
     can = c.walls[ahead] == 0 and c.ground[ahead] & 15 != QUEEN
     if c.food_sources[FoodSourceRow.TAKEN, source] < 0:
-        in_row = True
-        while in_row:
-            in_row = False
+        pile, other = c.food_sources[FoodSourceRow.PILE, source], c.source_of[ahead]
+        while other >= 0 and c.food_sources[FoodSourceRow.PILE, ti.max(other, 0)] == pile:
+            ahead += step
             other = c.source_of[ahead]
-            if other >= 0:
-                in_row = (
-                    c.food_sources[FoodSourceRow.PILE, other]
-                    == c.food_sources[FoodSourceRow.PILE, source]
-                )
-            if in_row:
-                ahead += step
         can = c.ground[ahead] == EMPTY
     return can
 
 
-@ti.func
-def update_slots(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def update_slots(c, v, w, chunk, ant, tick):
     """Free the slot of a dying ant, and let a newborn ant live, at the end of the tick."""
     if trait(c.stage, ant) == Stage.NEWBORN:
         put(c.stage, ant, Stage.LIVING)
@@ -302,8 +280,8 @@ def update_slots(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             c.first_streams[w * c.n_slots + c.number[ant]] = c.streams[ant]
 
 
-@ti.func
-def end_tick(c: ti.template(), v: ti.template(), w, tick):
+@function
+def end_tick(c, v, w, tick):
     """Count the tick, and end the episode of a world at a delivery if `c.ends_at_delivery`."""
     for tick_ended in ti.static(v.at["tick_ended"]):
         for nest in range(v.n_nests):

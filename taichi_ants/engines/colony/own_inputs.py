@@ -12,18 +12,11 @@ from itertools import accumulate
 from typing import Any
 
 import taichi as ti
+from taichi.lang.impl import subscript
 
 from taichi_ants.arithmetic.random_bits import high_word, low_word
-from taichi_ants.engines.colony.columns import individual
-from taichi_ants.engines.colony.steps import (
-    cell_ahead,
-    cue_level,
-    event_reward,
-    explore_below_of,
-    owner_of,
-    table_of,
-    trait,
-)
+from taichi_ants.engines.colony import steps
+from taichi_ants.engines.colony.columns import function, individual, trait
 from taichi_ants.engines.colony.trail import level_of
 from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.engines.own_rules import bounded_function
@@ -36,9 +29,9 @@ from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.rules.actions import step_towards
 from taichi_ants.task.rules.vision import code_in_view
 
-_CODE, _IS_TRUE, _IS_OPEN, _NEARER = range(4)  # the results of `cell_ahead`
+_CODE, _, _IS_OPEN, _NEARER = range(4)  # the results of `cell_ahead`
 _WORDS = 4294967296.0
-Make = dict[str, Callable[[], Any]]  # functions that return the inputs of a rule
+Inputs = dict[str, Any]  # values of kernels, or functions that return them
 
 
 class OwnRule:
@@ -48,66 +41,66 @@ class OwnRule:
     """
 
     def __init__(self, rule: Rule, first: int) -> None:
-        self.inputs, self.function = tuple(rule.inputs), bounded_function(rule)
+        self.names, self.function = tuple(rule.inputs), bounded_function(rule)
         self.places = range(first, first + len(rule.parameters))
 
     @while_compiling
     def choose(self, c, v, cues, w, ant, state, paper_state, tick, bits):
-        """Return an action, i32; see `steps.draw_by_cues`."""
-        carries, seen = trait(c.carries, ant), state if v.is_papers else paper_state
-        sight = c, v, cues, w, ant, seen, paper_state
-        make = {
-            "values": lambda: _values(c, v, w, ant, state),
-            "codes": lambda: _ahead(*sight, _CODE),
-            "is_open": lambda: _ahead(*sight, _IS_OPEN),
-            "nearer": lambda: _ahead(*sight, _NEARER) * carries,
-            "carries": lambda: carries,
-            "paper_state": lambda: seen,
-            "epsilon": lambda: _share(explore_below_of(c, v, w, ant)),
-            "random": lambda: _share(low_word(bits)),
-            "random_2": lambda: _share(high_word(bits)),
-            **_of_ants(c, v, w, ant, tick),
+        """Return an action, i32; see `steps.draw_action`."""
+        sight = c, v, cues, w, ant, state if v.is_papers else paper_state, paper_state
+
+        def ahead(result):
+            results = (steps.cell_ahead(*sight, i) for i in range(AHEAD))
+            return ti.Vector([of_cell[result] for of_cell in results])
+
+        def share(word):
+            return ti.cast(word, ti.f64) / _WORDS
+
+        def values():
+            return values_of(c.q, steps.table_of(c, v, steps.owner_of(c, v, w, ant)), state)
+
+        inputs = {
+            "values": values,
+            "codes": lambda: ahead(_CODE),
+            "is_open": lambda: ahead(_IS_OPEN),
+            "nearer": lambda: ahead(_NEARER) * trait(c.carries, ant),
+            "paper_state": sight[-2],
+            "epsilon": lambda: share(steps.explore_below_of(c, v, w, ant)),
+            "random": lambda: share(low_word(bits)),
+            "random_2": lambda: share(high_word(bits)),
         }
-        return self.result(c, make | _of_levels(self.inputs, *sight, carries, tick))
+        return self.result(c, inputs | _of_sight(self.names, *sight, tick, tick))
 
     @while_compiling
     def lay(self, c, v, w, ant, level, index, carried, carries, event, paper_state, tick):
         """Return a level, f64; see `trail.deposit`."""
-        make: Make = {name: partial(_level, c, v, name, index, tick) for name in self.inputs}
-        make |= {
-            "level": lambda: level,
-            "carried": lambda: carried,
-            "carries": lambda: carries,
-            "event": lambda: event,
-            "paper_state": lambda: paper_state,
-            **_of_ants(c, v, w, ant, tick),
-        }
-        return self.result(c, make)
+        inputs = {"level": level, "carried": carried, "carries": carries, "event": event}
+        inputs |= {"paper_state": paper_state, **_of_ant(c, v, w, ant, tick)}
+        levels = {name: partial(_level, c, v, name, index, tick) for name in self.names}
+        return self.result(c, levels | inputs)
 
     @while_compiling
     def evaporate(self, c, level, tick):
         """Return a level, f64; see `trail.evaporate`."""
-        return self.result(c, {"level": lambda: level, "tick": lambda: tick})
+        return self.result(c, {"level": level, "tick": tick})
 
     @while_compiling
     def pay(self, c, v, cues, w, ant, next_paper_state, tick):
         """Return a reward, i32; see `steps.own_reward`."""
-        carries, seen = trait(c.carries, ant), next_paper_state
-        make = {
-            "reward": lambda: event_reward(c, v, ant),
+        inputs = {
+            "reward": lambda: steps.event_reward(c, v, ant),
             "event": lambda: trait(c.event, ant),
-            "carries": lambda: carries,
             "paper_state": lambda: trait(c.paper_state, ant),
-            "next_paper_state": lambda: next_paper_state,
-            **_of_ants(c, v, w, ant, tick),
+            "next_paper_state": next_paper_state,
         }
-        sight = c, v, cues, w, ant, seen, seen
-        return self.result(c, make | _of_levels(self.inputs, *sight, carries, tick + 1))
+        sight = c, v, cues, w, ant, next_paper_state, next_paper_state
+        return self.result(c, inputs | _of_sight(self.names, *sight, tick, tick + 1))
 
-    def result(self, c: Any, make: Make) -> Any:
-        """Return the result of the rule, for functions that return its inputs."""
-        inputs = [make[name]() for name in self.inputs]
-        return self.function(*inputs, *(_number(c, place) for place in self.places))
+    def result(self, c: Any, inputs: Inputs) -> Any:
+        """Return the result of the rule for its inputs, among others."""
+        made = (inputs[name] for name in self.names)
+        values = [value() if callable(value) else value for value in made]
+        return self.function(*values, *(subscript(None, c.rule_numbers, k) for k in self.places))
 
 
 def own_rules(rules: Sequence[Rule]) -> dict[Rule, OwnRule]:
@@ -116,41 +109,39 @@ def own_rules(rules: Sequence[Rule]) -> dict[Rule, OwnRule]:
     return {rule: OwnRule(rule, first) for rule, first in zip(rules, firsts, strict=False)}
 
 
-@ti.func
-def _number(c: ti.template(), place: ti.template()):
-    """Return a parameter of a rule."""
-    return c.rule_numbers[place]
-
-
-def _of_ants(c: Any, v: Any, w: Any, ant: Any, tick: Any) -> Make:
+def _of_ant(c: Any, v: Any, w: Any, ant: Any, tick: Any) -> Inputs:
     """Return the inputs of all kinds of rules that ants follow."""
-    return {
-        "trait": lambda: individual(c, w, ant),
-        **{name: partial(read, ant_view(c, v, w, ant)) for name, (_, read) in INPUTS.items()},
-        "tick": lambda: tick,
+    of_features = {
+        name: partial(read, ant_view(c, v, w, ant)) for name, (_, read) in INPUTS.items()
     }
+    return {"trait": lambda: individual(c, w, ant), "tick": tick, **of_features}
 
 
-def _of_levels(
+def _of_sight(
     names: Sequence[str], c: Any, v: Any, cues: Any, w: Any, ant: Any, seen: Any, paper_state: Any,
-    carries: Any, tick: Any,
-) -> Make:  # fmt: skip
-    """Return those inputs that are levels of the ant's cue or of fields, for rules of ants."""
+    tick: Any, level_tick: Any,
+) -> Inputs:  # fmt: skip
+    """Return the inputs of rules of choice and of rewards, among them levels in `level_tick`."""
+    here, carries = w * c.size + ant_view(c, v, w, ant).cell, partial(trait, c.carries, ant)
 
-    def of_own_cell(name: str) -> Any:
-        return _level(c, v, name, _place(c, w, ant), tick)
+    def of_cue(index: Any) -> Any:
+        return steps.cue_level(c, v, cues, carries(), index, level_tick)
 
-    ahead = partial(_levels, c, v, cues, w, ant, seen=seen, paper_state=paper_state, tick=tick)
-    levels: Make = {
-        "levels": partial(ahead, number=-1),
-        "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick),
-    }
+    def ahead(level_at: Callable[[Any], Any]) -> Any:
+        """Return levels ahead, f64 (3,): 0 where no ant can be, and in cells that are misread."""
+        levels = []
+        for i in range(AHEAD):
+            index = here + step_towards(c.compass, trait(c.heading, ant), i)
+            shows = _shows(c, index, seen, paper_state, i)
+            levels.append(ti.select(shows, ti.cast(level_at(index), ti.f64), 0.0))
+        return ti.Vector(levels)
+
+    inputs = {"carries": carries, "level": partial(of_cue, here), "levels": partial(ahead, of_cue)}
     for name in filter(field_of, names):
-        if name.startswith(LEVELS):
-            levels[name] = partial(ahead, number=v.field_names.index(field_of(name)))
-        else:
-            levels[name] = partial(of_own_cell, name)
-    return levels
+        of_field = partial(_level, c, v, name, tick=level_tick)
+        is_ahead = name.startswith(LEVELS)
+        inputs[name] = partial(ahead, of_field) if is_ahead else partial(of_field, here)
+    return inputs | _of_ant(c, v, w, ant, tick)
 
 
 def _level(c: Any, v: Any, name: str, index: Any, tick: Any) -> Any:
@@ -158,61 +149,8 @@ def _level(c: Any, v: Any, name: str, index: Any, tick: Any) -> Any:
     return level_of(v.field(c, v.field_names.index(field_of(name))), index, tick)
 
 
-@ti.func
-def _share(word):
-    """Return a 32-bit word as a share of all words, f64."""
-    return ti.cast(word, ti.f64) / ti.f64(_WORDS)
-
-
-@ti.func
-def _values(c: ti.template(), v: ti.template(), w, ant, state):
-    """Return the action values of an ant in a state, f32 (5,)."""
-    return values_of(c.q, table_of(c, v, owner_of(c, v, w, ant)), state)
-
-
-@ti.func
-def _place(c: ti.template(), w, ant):
-    """Return the place of the cell of an ant in arrays of cells."""
-    return w * c.size + c.cell[ant]
-
-
-@ti.func
-def _ahead(
-    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, seen, paper_state,
-    which: ti.template()
-):  # fmt: skip
-    """Return one of the results of `cell_ahead` for the cells ahead, i32 (3,)."""
-    values = ti.Vector([0, 0, 0])
-    for i in ti.static(range(AHEAD)):
-        code, _, opens, nears = cell_ahead(c, v, cues, w, ant, seen, paper_state, i)
-        if ti.static(which == _CODE):
-            values[i] = code
-        elif ti.static(which == _IS_OPEN):
-            values[i] = opens
-        else:
-            values[i] = nears
-    return values
-
-
-@ti.func
-def _levels(
-    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, number: ti.template(), seen,
-    paper_state, tick
-):  # fmt: skip
-    """Return the levels ahead of a pheromone, or of the ant's cue for number -1, f64 (3,).
-
-    Cells on which no ant can be have level 0, and so do cells that the ant misreads.
-    """
-    levels = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
-    carries, heading = trait(c.carries, ant), trait(c.heading, ant)
-    for i in ti.static(range(AHEAD)):
-        index = _place(c, w, ant) + step_towards(c.compass, heading, i)
-        shows = (c.ground[index] & 15 == EMPTY) | (c.ground[index] >> 4 != 0)
-        shows = shows & (code_in_view(seen, i) == code_in_view(paper_state, i))
-        level = ti.f64(0.0)
-        if ti.static(number < 0):
-            level = ti.cast(cue_level(c, v, cues, carries, index, tick), ti.f64)
-        else:
-            level = ti.cast(level_of(ti.static(v.field(c, number)), index, tick), ti.f64)
-        levels[i] = ti.select(shows, level, ti.f64(0.0))
-    return levels
+@function
+def _shows(c, index, seen, paper_state, i: ti.template()):
+    """Return whether an ant can be on the cell ahead of an ant, which the ant does not misread."""
+    shows = (c.ground[index] & 15 == EMPTY) | (c.ground[index] >> 4 != 0)
+    return shows & (code_in_view(seen, i) == code_in_view(paper_state, i))

@@ -20,7 +20,15 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below
-from taichi_ants.engines.colony.columns import group_of, individual, nest_of, of_caste, put, trait
+from taichi_ants.engines.colony.columns import (
+    function,
+    group_of,
+    individual,
+    nest_of,
+    of_caste,
+    put,
+    trait,
+)
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
@@ -31,7 +39,6 @@ from taichi_ants.engines.colony.layout import (
     FoodSourceRow,
     NestRow,
     Tally,
-    WorldRow,
 )
 from taichi_ants.engines.colony.trail import (
     deposit,
@@ -62,30 +69,11 @@ from taichi_ants.task.constants import (
 )
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import OCCASIONS
-from taichi_ants.task.rules import conflicts, noise, vision
-from taichi_ants.task.rules.actions import (
-    MOVES,
-    is_open,
-    move_event,
-    step_around,
-    step_towards,
-    turn_round,
-    turned_by,
-)
-from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
-from taichi_ants.task.rules.policy import (
-    attraction,
-    best_actions,
-    bit_number,
-    choose_cell,
-    choose_in_crowd,
-    choose_softly,
-    lowest_bit_number,
-)
+from taichi_ants.task.rules import actions, conflicts, delivery, noise, policy, vision
 
 
-@ti.func
-def state_index_of(c: ti.template(), v: ti.template(), ant):
+@function
+def state_index_of(c, v, ant):
     """Return the state index of an ant."""
     state = trait(c.paper_state, ant)
     if ti.static(not v.sees_paper_state):
@@ -93,8 +81,8 @@ def state_index_of(c: ti.template(), v: ti.template(), ant):
     return state
 
 
-@ti.func
-def observe(c: ti.template(), v: ti.template(), w, ant, tick):
+@function
+def observe(c, v, w, ant, tick):
     """Return the paper's state and the state index of an ant, which may misread cells."""
     paper_state, state = 0, 0
     if ti.static(len(v.cues) == 1):
@@ -106,8 +94,8 @@ def observe(c: ti.template(), v: ti.template(), w, ant, tick):
     return paper_state, state
 
 
-@ti.func
-def observe_by(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
+@function
+def observe_by(c, v, cues, w, ant, tick):
     """Return the paper's state and the state index of an ant that follows some cues."""
     paper_state, state = 0, 0
     if ti.static(v.is_papers):
@@ -124,8 +112,8 @@ def observe_by(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, 
     return paper_state, state
 
 
-@ti.func
-def observe_with(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, carries, tick):
+@function
+def observe_with(c, v, cues, w, ant, carries, tick):
     """Return the paper's state and the state index of an ant with or without food (`carries`)."""
     view = view_around(c, v, cues, w, ant, carries, tick)
     paper_state = view.paper_state  # the true one
@@ -136,13 +124,13 @@ def observe_with(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant
     return paper_state, v.encode(view)
 
 
-@ti.func
-def see(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
+@function
+def see(c, v, cues, w, ant, tick):
     """Return the paper's state, without values that only other observations need."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
-    left = here + step_towards(c.compass, heading, LEFT)
-    forward = here + step_towards(c.compass, heading, FORWARD)
-    right = here + step_towards(c.compass, heading, RIGHT)
+    left = here + actions.step_towards(c.compass, heading, LEFT)
+    forward = here + actions.step_towards(c.compass, heading, FORWARD)
+    right = here + actions.step_towards(c.compass, heading, RIGHT)
     queen = own_queen(c, v, w, ant)
     ground_left, ground_forward = looks_of(c, v, left, queen), looks_of(c, v, forward, queen)
     ground_right = looks_of(c, v, right, queen)
@@ -180,8 +168,8 @@ def see(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
     return paper_state
 
 
-@ti.func
-def strongest_of(c: ti.template(), field: ti.template(), left, forward, right, tick):
+@function
+def strongest_of(c, field, left, forward, right, tick):
     """Return the largest level that counts among the three cells ahead."""
     others = ti.max(
         level_that_counts(c, field, forward, tick), level_that_counts(c, field, right, tick)
@@ -189,8 +177,8 @@ def strongest_of(c: ti.template(), field: ti.template(), left, forward, right, t
     return ti.max(level_that_counts(c, field, left, tick), others)
 
 
-@ti.func
-def cue_level(c: ti.template(), v: ti.template(), cues: ti.template(), carries, index, tick):
+@function
+def cue_level(c, v, cues, carries, index, tick):
     """Return the level of a cell in the pheromone that an ant with this load follows.
 
     If ants have a compass, this is the outbound cue for all ants, or `Choice.carriers_follow`.
@@ -203,14 +191,12 @@ def cue_level(c: ti.template(), v: ti.template(), cues: ti.template(), carries, 
     return level
 
 
-@ti.func
-def strongest_cue(
-    c: ti.template(), v: ti.template(), cues: ti.template(), carries, here, heading, tick
-):  # fmt: skip
+@function
+def strongest_cue(c, v, cues, carries, here, heading, tick):
     """Return the largest level that counts ahead, in the pheromone of `cue_level`."""
-    left = here + step_towards(c.compass, heading, LEFT)
-    forward = here + step_towards(c.compass, heading, FORWARD)
-    right = here + step_towards(c.compass, heading, RIGHT)
+    left = here + actions.step_towards(c.compass, heading, LEFT)
+    forward = here + actions.step_towards(c.compass, heading, FORWARD)
+    right = here + actions.step_towards(c.compass, heading, RIGHT)
     outbound = ti.static(v.field(c, cues.outbound))
     level = ti.cast(strongest_of(c, outbound, left, forward, right, tick), v.level_type)
     if ti.static(not cues.has_compass):
@@ -220,8 +206,8 @@ def strongest_cue(
     return level
 
 
-@ti.func
-def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, carries, tick):
+@function
+def view_around(c, v, cues, w, ant, carries, tick):
     """Return the view of an ant with food (`carries` is 1) or without."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
@@ -229,7 +215,7 @@ def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant,
     view = v.view_type(carries=carries, own_level=cue_level(c, v, cues, carries, here, tick))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
-        index = here + step_around(c.compass, heading, cells[k])
+        index = here + actions.step_around(c.compass, heading, cells[k])
         held = ti.cast(c.ground[index] >> 4, ti.i32)  # 0 without an ant
         standable = (c.ground[index] & 15 == EMPTY) | (held != 0)
         view.levels[k] = ti.select(standable, cue_level(c, v, cues, carries, index, tick), 0)
@@ -257,24 +243,24 @@ def set_entry(view: Any, name: str, level: Any) -> None:
     getattr(view, f"own_{name}")._assign(level)
 
 
-@ti.func
-def read_fields(c: ti.template(), v: ti.template(), view: ti.template(), k, index, standable, tick):
+@function
+def read_fields(c, v, view, k, index, standable, tick):
     """Set the levels of cell number k of a view in the pheromones that the observation reads."""
     for i in ti.static(range(len(v.reads))):
         level = level_of(ti.static(v.field(c, v.reads[i])), index, tick)
         noise.entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
 
 
-@ti.func
-def read_own_levels(c: ti.template(), v: ti.template(), view: ti.template(), here, tick):
+@function
+def read_own_levels(c, v, view, here, tick):
     """Set the levels of the ant's own cell in the pheromones that the observation reads."""
     for i in ti.static(range(len(v.reads))):
         level = level_of(ti.static(v.field(c, v.reads[i])), here, tick)
         set_entry(view, v.observation.reads[i], level)
 
 
-@ti.func
-def looks_of(c: ti.template(), v: ti.template(), index, queen):
+@function
+def looks_of(c, v, index, queen):
     """Return the ground of a cell, i32, as an ant sees it whose queen is on the cell `queen`.
 
     Ants, and the queens of other nests, look like obstacles.
@@ -285,8 +271,8 @@ def looks_of(c: ti.template(), v: ti.template(), index, queen):
     return ground
 
 
-@ti.func
-def holds_nestmate(c: ti.template(), v: ti.template(), ant, index):
+@function
+def holds_nestmate(c, v, ant, index):
     """Return whether an ant of the same nest is on a cell; others are obstacles."""
     held = ti.cast(c.ground[index] >> 4, ti.i32)
     holds = held != 0
@@ -295,8 +281,8 @@ def holds_nestmate(c: ti.template(), v: ti.template(), ant, index):
     return holds
 
 
-@ti.func
-def own_queen(c: ti.template(), v: ti.template(), w, ant):
+@function
+def own_queen(c, v, w, ant):
     """Return the place of an ant's queen in `ground`; -1 with one nest, which needs none."""
     queen = -1
     if ti.static(v.n_nests > 1):
@@ -305,76 +291,64 @@ def own_queen(c: ti.template(), v: ti.template(), w, ant):
     return queen
 
 
-@ti.func
-def own_map(c: ti.template(), v: ti.template(), w, ant):
+@function
+def own_map(c, v, w, ant):
     """Return the place of an ant's cell in the map of its nest in `closer`."""
     return (w * v.n_nests + nest_of(c, v, ant)) * c.size + c.cell[ant]
 
 
-@ti.func
-def table_of(c: ti.template(), v: ti.template(), owner):
+@function
+def table_of(c, v, owner):
     """Return the start of the tables of an ant, or of a world whose ants share a table."""
     return owner * c.tables * v.n_numbers
 
 
-@ti.func
-def owner_of(c: ti.template(), v: ti.template(), w, ant):
+@function
+def owner_of(c, v, w, ant):
     """Return the owner of the table by which an ant chooses: its slot, or its world and group."""
     return ant if ti.static(v.own_tables) else w * v.n_groups + group_of(c, v, ant)
 
 
-@ti.func
-def draw_action(c: ti.template(), v: ti.template(), w, ant, state, paper_state, tick, random_state):
+@function
+def draw_action(c, v, w, ant, state, paper_state, tick, random_state):
     """Return the ant's action in a state, by a random stream that was advanced for it."""
     action, bits = 0, bits_of(random_state)
-    if ti.static(v.own_choice or v.choice == "deneubourg"):
+    if ti.static(v.draw_by_cues):
         if ti.static(len(v.cues) == 1):
-            action = draw_by_cues(
-                c, v, ti.static(v.cues[0]), w, ant, state, paper_state, tick, bits
-            )
+            cues = ti.static(v.cues[0])
+            action = v.draw_by_cues(c, v, cues, w, ant, state, paper_state, tick, bits)
         else:
             for i in ti.static(range(len(v.cues))):
                 if of_caste(c, ant, CasteRow.CUES) == i:
                     cues = ti.static(v.cues[i])
-                    action = draw_by_cues(c, v, cues, w, ant, state, paper_state, tick, bits)
+                    action = v.draw_by_cues(c, v, cues, w, ant, state, paper_state, tick, bits)
     else:
         table = table_of(c, v, owner_of(c, v, w, ant))
         explore_below = explore_below_of(c, v, w, ant)
         if ti.static(v.choice == "softmax"):
             temperature = choice_number(c, v, ant, ti.static(CasteRow.TEMPERATURE))
-            action = choose_softly(values_of(c.q, table, state), bits, explore_below, temperature)
+            action = policy.choose_softly(
+                values_of(c.q, table, state), bits, explore_below, temperature
+            )
         else:
             best = best_actions_of(c, v, table, state)
-            action = choose_in_crowd(c.compass, best, bits, explore_below)
+            action = policy.choose_in_crowd(c.compass, best, bits, explore_below)
     return action
 
 
-@ti.func
-def best_actions_of(c: ti.template(), v: ti.template(), table, state):
+@function
+def best_actions_of(c, v, table, state):
     """Return the `best_actions` of a state; they are stored unless ants have their own tables."""
     best = 0
     if ti.static(v.independent):
-        best = best_actions(values_of(c.q, table, state))
+        best = policy.best_actions(values_of(c.q, table, state))
     else:
         best = ti.cast(c.q[table + state * ROW + BEST_AT], ti.i32)
     return best
 
 
-@ti.func
-def draw_by_cues(
-    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, state, paper_state, tick, bits
-):  # fmt: skip
-    """Return the ant's action by your own rule, or by the rule "deneubourg"."""
-    action = 0
-    if ti.static(v.own_choice):
-        action = v.own_choice(c, v, cues, w, ant, state, paper_state, tick, bits)
-    else:
-        action = draw_cell(c, v, cues, w, ant, state, bits)
-    return action
-
-
-@ti.func
-def own_reward(c: ti.template(), v: ti.template(), w, ant, paper_state, tick):
+@function
+def own_reward(c, v, w, ant, paper_state, tick):
     """Return the reward of an ant by your own rule, i32; `paper_state` is the new one."""
     reward = 0
     if ti.static(len(v.cues) == 1):
@@ -386,11 +360,8 @@ def own_reward(c: ti.template(), v: ti.template(), w, ant, paper_state, tick):
     return reward
 
 
-@ti.func
-def cell_ahead(
-    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, state, paper_state,
-    i: ti.template()
-):  # fmt: skip
+@function
+def cell_ahead(c, v, cues, w, ant, state, paper_state, i: ti.template()):
     """Return how an ant sees the cell left (0), forward (1) or right (2) of it, i32 each.
 
     `state` is the paper's state as the ant sees it, `paper_state` the true one. A cell with an ant
@@ -402,9 +373,9 @@ def cell_ahead(
     heading, carries = trait(c.heading, ant), trait(c.carries, ant)
     code = vision.code_in_view(state, i)
     is_true = code == vision.code_in_view(paper_state, i)
-    opens = ti.cast(is_open(code), ti.i32)
+    opens = ti.cast(actions.is_open(code), ti.i32)
     nears = ti.cast(code == SEES_CUE, ti.i32) & ti.static(int(cues.has_compass))
-    index = w * c.size + c.cell[ant] + step_towards(c.compass, heading, i)
+    index = w * c.size + c.cell[ant] + actions.step_towards(c.compass, heading, i)
     if is_true & (c.ground[index] >> 4 != 0):  # an ant stands there
         nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
         nears = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(cues.has_compass))
@@ -414,8 +385,8 @@ def cell_ahead(
     return code, ti.cast(is_true, ti.i32), opens, nears
 
 
-@ti.func
-def explore_below_of(c: ti.template(), v: ti.template(), w, ant):
+@function
+def explore_below_of(c, v, w, ant):
     """Return the bound of a random 32-bit word below which an ant explores, u64."""
     bound = c.explore_below
     if ti.static(v.n_castes > 0):
@@ -428,8 +399,8 @@ def explore_below_of(c: ti.template(), v: ti.template(), w, ant):
     return bound
 
 
-@ti.func
-def choice_number(c: ti.template(), v: ti.template(), ant, row: ti.template()):
+@function
+def choice_number(c, v, ant, row):
     """Return a number of the rule by which an ant chooses, f64; `row` is a `CasteRow`."""
     number = c.choice[row - CasteRow.TEMPERATURE]
     if ti.static(v.n_castes > 0):
@@ -437,20 +408,16 @@ def choice_number(c: ti.template(), v: ti.template(), ant, row: ti.template()):
     return number
 
 
-@ti.func
-def draw_cell(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, state, bits):
+@function
+def draw_cell(c, v, cues, w, ant, state, paper_state, tick, bits):
     """Return the ant's action by the rule "deneubourg", with 64 random bits.
 
-    `state` is the paper's state as the ant sees it. A cell that it misreads looks as if it had no
-    trail, and is nearer to the queen if it looks S. With a field as homing cue, no cell is nearer.
+    `state` is the paper's state as the ant sees it, `paper_state` the true one. A cell that it
+    misreads looks as if it had no trail, and is nearer to the queen if it looks S. With a field as
+    homing cue, no cell is nearer.
     """
-    paper_state, heading, carries = (
-        trait(c.paper_state, ant),
-        trait(c.heading, ant),
-        trait(c.carries, ant),
-    )
+    heading, carries = trait(c.heading, ant), trait(c.carries, ant)
     here = w * c.size + c.cell[ant]
-    tick = c.worlds[WorldRow.TICKS, w]
     codes, opens, nears = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
     weights = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
     k = choice_number(c, v, ant, ti.static(CasteRow.K))
@@ -459,14 +426,14 @@ def draw_cell(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, s
         codes[i], is_true, opens[i], nears[i] = cell_ahead(
             c, v, cues, w, ant, state, paper_state, i
         )
-        index = here + step_towards(c.compass, heading, i)
+        index = here + actions.step_towards(c.compass, heading, i)
         level = cue_level(c, v, cues, carries, index, tick)
-        weights[i] = attraction(ti.select(is_true == 1, level, 0), k, exponent)
-    return choose_cell(carries, codes, opens, nears, weights, bits)
+        weights[i] = policy.attraction(ti.select(is_true == 1, level, 0), k, exponent)
+    return policy.choose_cell(carries, codes, opens, nears, weights, bits)
 
 
-@ti.func
-def executed_by(c: ti.template(), v: ti.template(), ant):
+@function
+def executed_by(c, v, ant):
     """Return the action that an ant executes in this tick."""
     action = 0
     if ti.static(v.slips):
@@ -476,8 +443,8 @@ def executed_by(c: ti.template(), v: ti.template(), ant):
     return action
 
 
-@ti.func
-def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def want(c, v, w, chunk, ant, tick):
     """Turn an ant, and write what its action needs: a cell to enter, or food to take.
 
     There are few branches, because the processor cannot predict the actions of ants.
@@ -502,22 +469,22 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     for execute in ti.static(v.at["execute"]):
         if resting == 0:
             action, random_state = execute(ant_view(c, v, w, ant), action, random_state)
-    heading = turned_by(c.compass, trait(c.heading, ant), action)
-    step = step_towards(c.compass, heading, FORWARD)
+    heading = actions.turned_by(c.compass, trait(c.heading, ant), action)
+    step = actions.step_towards(c.compass, heading, FORWARD)
     # Arithmetic, because the compiler makes branches of selections between values in memory.
     enters = 1 - (vision.code_in_view(paper_state, action) & 1)
     if ti.static(v.traffic.shared):
         enters |= ti.cast(holds_nestmate(c, v, ant, w * c.size + cell + step), ti.i32)
-    enters &= MOVES >> action
+    enters &= actions.MOVES >> action
     wanted = cell + enters * step
     mark = v.mark_of_rest + enters * (conflicts.ENTER + heading - v.mark_of_rest)
     foods = vision.goals_in_view(paper_state) * (1 - carries)  # no branch by `carries`
     if (foods != 0) & (action == PICK_UP):
-        position = lowest_bit_number(foods)
+        position = policy.lowest_bit_number(foods)
         if foods & (foods - 1) != 0:  # several food items in view
             k, random_state = draw_below(random_state, popcnt(foods))
-            position = bit_number(foods, k)
-        wanted = cell + step_towards(c.compass, heading, position)
+            position = policy.bit_number(foods, k)
+        wanted = cell + actions.step_towards(c.compass, heading, position)
         mark = conflicts.TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
     if ti.static(v.traffic.shared):
         takes = ti.select(mark >= conflicts.TAKE, conflicts.TAKES_FOOD, 0)
@@ -532,8 +499,8 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     c.wants[w * c.size + cell] = ti.cast(mark, ti.u8)
 
 
-@ti.func
-def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def resolve(c, v, w, chunk, ant, tick):
     """Mark the ant if it wins its cell, and store the event of its move.
 
     Only rules by which ants can enter cells with ants need this. The event of a move does not
@@ -551,17 +518,17 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             c.want[ant] = cell
 
 
-@ti.func
-def step_ahead(c: ti.template(), ant):
+@function
+def step_ahead(c, ant):
     """Return the index step to the cell ahead of an ant."""
-    return step_towards(c.compass, trait(c.heading, ant), FORWARD)
+    return actions.step_towards(c.compass, trait(c.heading, ant), FORWARD)
 
 
-@ti.func
-def event_of(c: ti.template(), v: ti.template(), w, ant, tick):
+@function
+def event_of(c, v, w, ant, tick):
     """Return the event of a successful move; a cell with an ant shows a cue if it is better."""
     action, paper_state = executed_by(c, v, ant), trait(c.paper_state, ant)
-    event = move_event(vision.code_in_view(paper_state, action))
+    event = actions.move_event(vision.code_in_view(paper_state, action))
     here = w * c.size + c.cell[ant]
     ahead = here + step_ahead(c, ant)
     if conflicts.had_ant(c, ahead):  # rare, so that few trails are read
@@ -576,10 +543,8 @@ def event_of(c: ti.template(), v: ti.template(), w, ant, tick):
     return event
 
 
-@ti.func
-def is_better(
-    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, ahead, here, tick
-):  # fmt: skip
+@function
+def is_better(c, v, cues, w, ant, ahead, here, tick):
     """Return whether the cell ahead of an ant is better than its own cell, by its cues."""
     better = is_stronger(ti.static(v.field(c, cues.outbound)), ahead, here, tick)
     if trait(c.carries, ant) == 1:
@@ -591,21 +556,21 @@ def is_better(
     return better
 
 
-@ti.func
-def is_stronger(field: ti.template(), index, from_index, tick):
+@function
+def is_stronger(field, index, from_index, tick):
     """Return whether the level of a cell is higher than that of another one."""
     return level_of(field, index, tick) > level_of(field, from_index, tick)
 
 
-@ti.func
-def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+@function
+def act(c, v, w, chunk, ant, tick):
     """Do the action of an ant: move or pick up if it has won, or deliver; and deposit."""
     base = w * c.size
     trail = ti.static(v.field(c, 0))
     action, paper_state = executed_by(c, v, ant), trait(c.paper_state, ant)
     cell, wanted = c.cell[ant], c.want[ant]
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
-    moves = MOVES >> action & 1
+    moves = actions.MOVES >> action & 1
     goes, filled, enters, takes = cell, False, 0, False
     event = Event.FAILED + moves * ti.static(Event.BLOCKED - Event.FAILED)
     if ti.static(v.traffic.shared):
@@ -632,11 +597,11 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
                 if lays(c, v, ant, 0):
                     index = base + goes
                     deposit(c, v, trail, w, ant, index, tick, carried, carries, event, paper_state)
-        elif can_give(action, paper_state):
+        elif delivery.can_give(action, paper_state):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
             put(c.carries, ant, 0)
-            put(c.heading, ant, heading_after_delivery(heading, c.turns_at_queen))
+            put(c.heading, ant, delivery.heading_after_delivery(heading, c.turns_at_queen))
             tally(c, Tally.DELIVERIES, chunk, 1)
             count_apart(c, v, ant, chunk)
             for gave in ti.static(v.at["gave"]):
@@ -651,7 +616,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             if lays(c, v, ant, 0):
                 deposit(c, v, trail, w, ant, base + wanted, tick, 0, carries, event, paper_state)
                 deposit(c, v, trail, w, ant, base + cell, tick, 0, carries, event, paper_state)
-        put(c.heading, ant, turn_round(heading))
+        put(c.heading, ant, actions.turn_round(heading))
     if ti.static(len(v.pheromones) > 1):
         age = ti.select(carries == had_food, age, 0)
         occasions = occasions_of(had_food, paper_state, action, event, goes != cell)
@@ -686,8 +651,8 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 def lays_field(number: int) -> Callable[..., None]:
     """Return the `do` of a phase after `act` in which ants lay a pheromone, see `lays_in_turn`."""
 
-    @ti.func
-    def lay_apart(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+    @function
+    def lay_apart(c, v, w, chunk, ant, tick):
         cell, goes, carries = c.want[ant], c.cell[ant], trait(c.carries, ant)
         event, paper_state, had_food = trait(c.event, ant), trait(c.paper_state, ant), carries
         if event == Event.PICKED_UP:
@@ -712,8 +677,8 @@ def lays_field(number: int) -> Callable[..., None]:
     return lay_apart
 
 
-@ti.func
-def lays(c: ti.template(), v: ti.template(), ant, number: ti.template()):
+@function
+def lays(c, v, ant, number: ti.template()):
     """Return whether an ant lays a pheromone; without castes, always, while a kernel compiles."""
     does = True
     if ti.static(v.n_castes > 0):
@@ -721,14 +686,14 @@ def lays(c: ti.template(), v: ti.template(), ant, number: ti.template()):
     return does
 
 
-@ti.func
-def tally(c: ti.template(), state, chunk, n):
+@function
+def tally(c, state, chunk, n):
     """Add n to a tally of a chunk, which one thread processes; `+=` would be atomic and slower."""
     c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n
 
 
-@ti.func
-def count_apart(c: ti.template(), v: ti.template(), ant, chunk):
+@function
+def count_apart(c, v, ant, chunk):
     """Count a delivery by nest and kind of food, if there are several, and by caste."""
     if ti.static(v.counts_by_nest_and_kind):
         column = chunk * NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
@@ -740,8 +705,8 @@ def count_apart(c: ti.template(), v: ti.template(), ant, chunk):
         c.delivered_by_caste[column] = c.delivered_by_caste[column] + 1
 
 
-@ti.func
-def reward_of(c: ti.template(), v: ti.template(), ant):
+@function
+def reward_of(c, v, ant):
     """Return the reward of an ant for its last action, i32."""
     reward = 0
     if ti.static(v.has_own_reward):
@@ -751,8 +716,8 @@ def reward_of(c: ti.template(), v: ti.template(), ant):
     return reward
 
 
-@ti.func
-def event_reward(c: ti.template(), v: ti.template(), ant):
+@function
+def event_reward(c, v, ant):
     """Return the reward of the last event of an ant by the settings of the task, i32."""
     event = trait(c.event, ant)
     reward = c.rewards[event]
@@ -767,8 +732,8 @@ def event_reward(c: ti.template(), v: ti.template(), ant):
     return reward
 
 
-@ti.func
-def take_load(c: ti.template(), v: ti.template(), ant, index, tick):
+@function
+def take_load(c, v, ant, index, tick):
     """Take a load of food from a cell, which becomes empty with its last load."""
     loads_left = 0
     if ti.static(v.n_kinds > 1):
@@ -781,8 +746,8 @@ def take_load(c: ti.template(), v: ti.template(), ant, index, tick):
         take_from_source(c, index, tick)
 
 
-@ti.func
-def take_from_source(c: ti.template(), index, tick):
+@function
+def take_from_source(c, index, tick):
     """Let the food source whose food was taken from a cell, if any, wait from now on."""
     if c.n_food_sources > 0:
         source = c.source_of[index]

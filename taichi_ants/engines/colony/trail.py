@@ -10,6 +10,7 @@ from collections import namedtuple
 
 import taichi as ti
 
+from taichi_ants.engines.colony.columns import function
 from taichi_ants.task.constants import EMPTY, OBSTACLE, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import Occasion
@@ -27,8 +28,8 @@ PheromoneArrays = namedtuple(
 )
 
 
-@ti.func
-def level_of(field: ti.template(), index, tick):
+@function
+def level_of(field, index, tick):
     """Return the level of a cell in a tick: i32, or f32 if dense."""
     level = field.levels[index]
     if ti.static(not field.dense):
@@ -36,15 +37,15 @@ def level_of(field: ti.template(), index, tick):
     return level
 
 
-@ti.func
-def level_in_view(c: ti.template(), field: ti.template(), index, tick):
+@function
+def level_in_view(c, field, index, tick):
     """Return the level that an ant sees in a cell: 0 unless the cell is empty."""
     # Read without a branch, because the processor cannot predict which cells are empty.
     return ti.select(c.ground[index] & 15 == EMPTY, level_of(field, index, tick), 0)
 
 
-@ti.func
-def level_that_counts(c: ti.template(), field: ti.template(), index, tick):
+@function
+def level_that_counts(c, field, index, tick):
     """Return the level of a cell as it counts for the strongest one, 0 if it does not count."""
     level = level_in_view(c, field, index, tick)
     if ti.static(field.under_carriers):
@@ -53,11 +54,8 @@ def level_that_counts(c: ti.template(), field: ti.template(), index, tick):
     return level
 
 
-@ti.func
-def deposit(
-    c: ti.template(), v: ti.template(), field: ti.template(), w, ant, index, tick, carried, carries,
-    event, paper_state
-):  # fmt: skip
+@function
+def deposit(c, v, field, w, ant, index, tick, carried, carries, event, paper_state):
     """Deposit, by the rule of a pheromone, what an ant lays after some ticks with its load.
 
     `carries` and `event` are those after the ant's action, `paper_state` is that before it.
@@ -97,11 +95,8 @@ def occasions_of(had_food, paper_state, action, event, has_moved):
     return occasions
 
 
-@ti.func
-def lay(
-    c: ti.template(), v: ti.template(), field: ti.template(), w, ant, laid, cell, goes, food, tick,
-    carried, carries, event, paper_state
-):  # fmt: skip
+@function
+def lay(c, v, field, w, ant, laid, cell, goes, food, tick, carried, carries, event, paper_state):
     """Deposit on the cell that an ant leaves or enters, or on its food's, on an occasion `laid`."""
     base = w * c.size
     if laid != 0:
@@ -112,8 +107,8 @@ def lay(
             deposit(c, v, field, w, ant, food_place, tick, carried, carries, event, paper_state)
 
 
-@ti.func
-def evaporate(c: ti.template(), v: ti.template(), index, tick):
+@function
+def evaporate(c, v, index, tick):
     """Evaporate the dense pheromones of a cell for one tick."""
     for field in ti.static(v.dense_fields(c)):
         if ti.static(field.own_evaporation):
@@ -124,8 +119,8 @@ def evaporate(c: ti.template(), v: ti.template(), index, tick):
             field.levels[index] = pheromone.evaporated(field.levels[index], field.decay)
 
 
-@ti.func
-def diffuse(c: ti.template(), v: ti.template(), index, tick):
+@function
+def diffuse(c, v, index, tick):
     """Compute the levels of a cell after one tick of diffusion."""
     for field in ti.static(v.dense_fields(c)):
         if field.share > 0.0:
@@ -134,8 +129,8 @@ def diffuse(c: ti.template(), v: ti.template(), index, tick):
             )
 
 
-@ti.func
-def apply_diffusion(c: ti.template(), v: ti.template(), index, tick):
+@function
+def apply_diffusion(c, v, index, tick):
     """Set the levels of a cell to the results of `diffuse`."""
     for field in ti.static(v.dense_fields(c)):
         if field.share > 0.0:

@@ -92,22 +92,12 @@ class RunState(Record):
             epsilon[:], rate[:] = config.epsilon, config.learning_rate
         return state
 
-    def part(self, configs: slice | list[int]) -> RunState:
-        """Return the runs of some configurations, in arrays (runs, ...).
-
-        The arrays are views if `configs` is a slice, else copies.
-        """
+    def part(self, configs: slice) -> RunState:
+        """Return the runs of some configurations, as views (runs, ...)."""
         n, arrays = self.epsilon[configs].size, vars(self).items()
         return RunState(
             **{name: array[configs].reshape(n, *array.shape[2:]) for name, array in arrays}
         )
-
-    def put(self, configs: slice | list[int], part: RunState) -> None:
-        """Overwrite the runs of some configurations with a part that has copies, not views."""
-        for name, array in vars(self).items():
-            new = getattr(part, name)
-            if not np.may_share_memory(array, new):
-                array[configs] = new.reshape(array[configs].shape)
 
 
 def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:

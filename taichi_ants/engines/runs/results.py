@@ -167,7 +167,7 @@ class Trace(Record):
     """The record of n steps; cell, heading and state are those before the action.
 
     Attributes (int32 (n,) unless noted):
-        episodes: Number of the episode, from 0; in `trace_policies`, number of the policy.
+        episodes: Number of the episode, from 0, or of the policy if there are several.
         steps: Number of the step in its episode, from 0.
         cells: int32 (n, 3), cube coordinates in normal form.
         headings: Heading of the ant, 0 to 5.

@@ -5,11 +5,11 @@ Traces come from the same kernel as training and evaluation, compiled to record 
 
 from __future__ import annotations
 
-import copy
 import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, replace
 from functools import partial
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -98,8 +98,8 @@ def continue_training(
                 f"learner {config.learner!r} needs more memory than when this training started; "
                 "train again from the first episode."
             )
-    kept = replace(result, state=copy.deepcopy(result.state))
-    return _train(kept, episodes, threads, arch, progress)
+    copies = RunState(**{name: array.copy() for name, array in vars(state).items()})
+    return _train(replace(result, state=copies), episodes, threads, arch, progress)
 
 
 def _train(
@@ -114,33 +114,26 @@ def _train(
     runtime.start(threads, arch)
     configs, seeds, seconds = result.configs, result.seeds, 0.0
     outcomes = np.zeros((len(OUTCOMES), len(configs), len(seeds), episodes), dtype=np.int32)
-    # One kernel for each learner, and one cost for each learner with its hyperparameters.
-    groups: dict[tuple, list[int]] = {}
-    for c, config in enumerate(configs):
-        groups.setdefault((config.learner, config.hyperparameters), []).append(c)
-    done = 0
-    for group in groups.values():
-        chosen, n = [configs[c] for c in group], len(group)
-        # A slice copies nothing.
-        where = slice(group[0], group[0] + n) if group[-1] - group[0] == n - 1 else group
+    first = 0
+    # A launch has one kernel, of the learner, and one cost, of its hyperparameters.
+    for _, group in groupby(configs, lambda config: (config.learner, config.hyperparameters)):
+        chosen = tuple(group)
+        where = slice(first, first := first + len(chosen))
         state = result.state.part(where)
         runs = Runs.learning(result.world, result.task, result.max_steps, chosen, seeds, state)
-        into = outcomes[:, where].reshape(len(OUTCOMES), len(runs), episodes)  # a view, or a copy
-        part = progress and partial(_report, progress, done, n, len(configs))
+        into = outcomes[:, where].reshape(len(OUTCOMES), len(runs), episodes)  # a view
+        part = progress and partial(_report, progress, where, len(configs))
         seconds += runs.do_episodes(into, part)
-        outcomes[:, where] = into.reshape(len(OUTCOMES), n, len(seeds), episodes)
         check_finite(runs.state.q, chosen, seeds)
-        result.state.put(where, runs.state)
-        done += n
     joined: dict[str, Any] = dict(zip(OUTCOMES, outcomes, strict=True))
     if result.episodes:
         joined = {n: np.concatenate([getattr(result, n), a], axis=2) for n, a in joined.items()}
     return replace(result, **joined, seconds=seconds)
 
 
-def _report(progress: Progress, done: int, n: int, total: int, share: float) -> None:
-    """Report the progress of `n` configurations, of which a share is done, as that of all."""
-    progress((done + n * share) / total)
+def _report(progress: Progress, part: slice, total: int, share: float) -> None:
+    """Report the share of a part of `total` configurations that is done as that of all."""
+    progress((part.start + (part.stop - part.start) * share) / total)
 
 
 def evaluate(
@@ -210,26 +203,10 @@ def rollout(
     runs = Runs.following(world, task, max_steps, table[None], seeds, [number], epsilon)
     seed, kept = int(seeds[0]), table.copy()
     made_by = RolloutArguments(world, task, seed, max_steps, number, kept, epsilon)
-    return next(_followed(runs, made_by))
+    return next(followed(runs, made_by))
 
 
-def trace_policies(
-    world: World,
-    q_values: np.ndarray,
-    seeds: Sequence[int],
-    max_steps: int = EPISODE_STEPS,
-    task: Task | None = None,
-) -> Iterator[Trace]:
-    """Yield the traces of rollout 0 of many policies (n, n_states, 5), some policies at a time.
-
-    `seeds` has one seed per policy, and may repeat seeds. Other arguments are those of `evaluate`.
-    """
-    task, max_steps = arguments.checked_run(world, task, max_steps)
-    tables = checked_values(q_values, task)
-    yield from _followed(Runs.following(world, task, max_steps, tables, seeds, [0], epsilon=0.0))
-
-
-def _followed(runs: Runs, made_by: RolloutArguments | None = None) -> Iterator[Trace]:
+def followed(runs: Runs, made_by: RolloutArguments | None = None) -> Iterator[Trace]:
     """Yield the traces of one rollout of each policy; its number is that of the episode."""
     _check_length(runs.max_steps, MAX_ROLLOUT_STEPS)
     for steps in runs.record(episodes=1):

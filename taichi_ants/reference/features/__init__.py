@@ -9,14 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from taichi_ants.features import FEATURES, used_by
 from taichi_ants.reference.ants import Ant
+from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Task
-
-if TYPE_CHECKING:
-    from taichi_ants.reference.world_state import WorldState
 
 # In the order of the features, which is the order of random draws.
 TWINS = {

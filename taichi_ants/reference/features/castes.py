@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import STREAM_INDIVIDUAL
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.random_stream import WORDS, RandomStream, stream_state
-from taichi_ants.task import Caste
-
-if TYPE_CHECKING:
-    from taichi_ants.task import Task
+from taichi_ants.task import Caste, Task
 
 
 def caste_of(task: Task, ant: Ant) -> Caste:

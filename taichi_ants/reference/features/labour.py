@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +11,9 @@ from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.features.castes import caste_of
 from taichi_ants.reference.geometry import distance
 from taichi_ants.reference.random_stream import WORDS, RandomStream, stream_state
+from taichi_ants.reference.world_state import WorldState
 from taichi_ants.rules.functions import exp, log, power
-
-if TYPE_CHECKING:
-    from taichi_ants.reference.world_state import WorldState
-    from taichi_ants.task import Threshold
+from taichi_ants.task import Threshold
 
 
 def born(colony: Any, ant: Ant) -> None:

@@ -12,12 +12,10 @@ from taichi_ants.features.castes import chances_in, numbers_in
 from taichi_ants.interventions import SetTask
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
 from taichi_ants.task import Labour, Threshold
-from taichi_ants.task.events import Event
 
 TRAINING = TrainingConfig("q_learning", 0.5, 0.9, 0.1, 1.0)
 WORLD = worlds.open_world(seed=3, ranges=(50, 50, 50))
 LABOUR = Labour("thresholds", demand=6.0, relief=0.0, stop_probability=0.0)
-IDLE = {"castes": {"worker": {"threshold": 1e6}}, "labour": LABOUR}
 
 
 def follows(rules: Task, world=WORLD, seeds=0, **options) -> Colony:
@@ -101,22 +99,6 @@ def test_idle_ants_respond_to_the_stimulus(exponent):
     quits = (~colony.idle).mean()  # some foragers at the nest may have become idle again
     assert chance - 4 * error - 0.002 < quits < chance + 4 * error
     assert colony.stimuli.tolist() == [[12.0]]
-
-
-def test_idle_ants_do_nothing():
-    colony = follows(Task(**IDLE), ants=50)
-    before = colony.cells.copy(), colony.headings.copy()
-    colony.tick(20)
-    assert colony.idle.all()
-    assert (colony.events == Event.NONE).all()
-    assert (colony.actions == -1).all()
-    assert (colony.cells == before[0]).all()
-    assert (colony.headings == before[1]).all()
-    outcome = colony.outcome()
-    assert not outcome.returns.any()
-    assert not outcome.moves.any()
-    assert not outcome.blocked.any()
-    assert colony.snapshot().ant_idle.all()
 
 
 def test_ants_that_stop_foraging_are_without_food_next_to_their_queen():

@@ -8,7 +8,7 @@ import pytest
 from taichi_ants import Colony, World
 from taichi_ants.grid.randomness import GAMMA, mix
 from taichi_ants.task import Life, Pheromone, Task
-from taichi_ants.task.constants import EMPTY, FORWARD, GIVE, PICK_UP, RIGHT
+from taichi_ants.task.constants import EMPTY, FORWARD, GIVE, PICK_UP
 
 
 def begun(world: World, ants: int, life: Life = Life()) -> Colony:  # noqa: B008
@@ -53,22 +53,6 @@ def test_of_two_ants_that_want_one_cell_one_wins(row):
         assert second == (tuple(normal((3, row, 0))), 3, 0, 0)
 
 
-def test_two_ants_cannot_swap():
-    facing = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 3)])
-    outcome = ants(act(facing, [FORWARD, FORWARD]))
-    assert [ant[0] for ant in outcome] == [(2, 2, 0), (3, 2, 0)]
-    assert [ant[3] for ant in outcome] == [-1, -1]
-
-
-def test_a_following_chain_moves_only_at_its_head():
-    """A cell that is left in this tick was not empty at its start."""
-    chain = [((i, 0, 0), 0) for i in (1, 2, 3)]
-    world = World((8, 8, 1), (0, 7, 0), ants=chain)
-    outcome = ants(act(world, [FORWARD] * 3))
-    assert [ant[0] for ant in outcome] == [(1, 0, 0), (2, 0, 0), (4, 0, 0)]
-    assert [ant[3] for ant in outcome] == [-1, -1, 0]
-
-
 def test_one_food_goes_to_one_of_two_ants():
     """The winner turns round with the food; the loser gets -1 and stays as it is."""
     cells = [(2, 2, 0), (4, 2, 0)]
@@ -95,14 +79,6 @@ def test_six_ants_around_the_queen_all_give_in_one_tick():
     assert [ant[2:] for ant in ants(colony)] == [(0, 10)] * 6
     assert [ant[1] for ant in ants(colony)] == [(h + 3) % 6 for h in range(6)]
     assert colony.outcome().deliveries[0, 0] == 6
-
-
-def test_ants_look_like_obstacles_to_each_other():
-    world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 0)])
-    colony = begun(world, 2)
-    assert colony.arrays["paper_state"][0] >> 2 & 3 == 1
-    colony.act(np.array([[PICK_UP, RIGHT]]))  # the second moves away
-    assert colony.arrays["paper_state"][0] >> 2 & 3 == 0
 
 
 def test_a_steep_deposit_after_long_carrying_leaves_nothing():

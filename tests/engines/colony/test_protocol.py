@@ -21,7 +21,7 @@ from taichi_ants.interventions import Place, RemoveAnts, from_dict
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.protocol import At, Every, When
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.protocol import Protocol
+from taichi_ants.reference.interventions import Protocol
 from taichi_ants.task import foraging
 from taichi_ants.task.constants import BEST_AT, EMPTY, FOOD, OBSTACLE, ROW
 
@@ -76,7 +76,7 @@ def drawn_cases(kernel, seed, n_worlds):
             or drawn_castes(drawn, 0, 2, True, cues)
             or drawn
         )
-    rng = np.random.default_rng([seed, 7])
+    rng = np.random.default_rng([seed, 8])
     population = {**drawn.population, "ends_at_delivery": False}
     population["capacity"] = capacity = population["ants"] + int(rng.integers(2, 9))
     rules = {**population, "sharing": sharing, "q_values": drawn.q_values}

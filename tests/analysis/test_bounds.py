@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_search import PlainWorld, search_all_sequences, search_optimal, search_shortest
 
-from taichi_ants.analysis.bounds import episodes
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds, ExpectedEpisode
+from taichi_ants.analysis import bounds as exact_bounds
+from taichi_ants.analysis.bounds import EpisodeBounds, ExpectedEpisode
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.task import Pheromone, Rewards, Task
@@ -147,8 +147,8 @@ def test_every_food_in_reach_counts_for_the_size(
     foods: list, obstacles: list, states: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     world = World((6, 1, 1), (0, 0, 0), foods, obstacles, ants=[((1, 0, 0), 0)])
-    monkeypatch.setattr(episodes, "MAX_STATES", states)
+    monkeypatch.setattr(exact_bounds, "MAX_STATES", states)
     bounds_of(world)
-    monkeypatch.setattr(episodes, "MAX_STATES", states - 1)
+    monkeypatch.setattr(exact_bounds, "MAX_STATES", states - 1)
     with pytest.raises(AntsError, match=f"need {states} states, but at most {states - 1} are"):
         bounds_of(world)

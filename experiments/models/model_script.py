@@ -1,4 +1,4 @@
-"""The frame of the scripts in `experiments/models`: options, a table, a figure and its numbers."""
+"""The frame of the scripts in this folder: options, a table, a figure and its numbers."""
 
 from __future__ import annotations
 

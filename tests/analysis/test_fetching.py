@@ -15,8 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from taichi_ants import Task, worlds
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds, ExpectedEpisode
-from taichi_ants.analysis.bounds.surroundings import in_view, look_around
+from taichi_ants.analysis.bounds import EpisodeBounds, ExpectedEpisode, in_view, look_around
 from taichi_ants.worlds import World
 
 FETCHING = Task.named()["fetching"]

@@ -1,4 +1,4 @@
-"""Off-policy evaluation: estimates of the value of a policy from data of another policy.
+"""Estimates of the value of a policy from data of another policy.
 
 The *target policy* is the evaluated policy, and the *behaviour policy* generated the data. The
 value of a policy is its expected discounted return from the first states of the data's episodes.
@@ -6,27 +6,18 @@ value of a policy is its expected discounted return from the first states of the
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Annotated
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants import runtime
+from taichi_ants import AntsError, Dataset
 from taichi_ants.analysis.statistics import resampling_counts
-from taichi_ants.errors import AntsError, expect
-from taichi_ants.learners.config import InitialValue
 from taichi_ants.learners.policies import action_probabilities, checked_values
-from taichi_ants.offline.dataset import Dataset
-from taichi_ants.offline.learners import Discount, EmpiricalModel
-from taichi_ants.records import Record
-from taichi_ants.settings import Flag, Setting, Share, checked_arguments
-
-Resamples = Annotated[int, Setting(least=0, most=100_000)]
+from taichi_ants.offline.learners import EmpiricalModel
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class PolicyValues(Record):
+class PolicyValues(NamedTuple):
     """Estimated values of policies, float64 arrays in the leading shape of the tables.
 
     Attributes:
@@ -46,15 +37,14 @@ class PolicyValues(Record):
     effective_sample_size: np.ndarray
 
 
-@checked_arguments
 def importance_sampling(
     data: Dataset,
     q_values: np.ndarray,
-    discount: Share = 0.9,
-    epsilon: Share = 0.0,
-    weighted: Flag = True,
-    resamples: Resamples = 200,
-    level: Share = 0.95,
+    discount: float = 0.9,
+    epsilon: float = 0.0,
+    weighted: bool = True,
+    resamples: int = 200,
+    level: float = 0.95,
 ) -> PolicyValues:
     """Return values by per-decision importance sampling (Precup, Sutton and Singh, ICML 2000).
 
@@ -75,52 +65,51 @@ def importance_sampling(
         level: The confidence level of the intervals.
 
     Raises:
-        AntsError: An argument is not allowed, or the data have no behaviour probabilities.
+        AntsError: The data have no behaviour probabilities.
     """
-    policies, shape = _policies(data, q_values, epsilon)
     if np.isnan(data.behaviour_probability).any():
-        raise AntsError(
-            "behaviour_probability of the data contains nan; record data with record or "
-            "record_colony, or use model_based."
-        )
-    runtime.start()
-    from taichi_ants.offline.kernels import add_up, weigh  # imports Taichi
-
-    times, begins = _times(data, resamples), data.begins.astype(np.int32)
-    longest = int(np.diff(begins).max())
-    weights, estimates = np.empty(len(data)), np.empty(len(times))
-    sums = np.empty((3, len(times), longest + 1))
+        raise AntsError("behaviour_probability of the data contains nan; use model_based.")
+    times, begins = _times(data, resamples), data.begins
+    lengths, step = np.diff(begins), np.arange(len(data)) - begins[data.episode]
+    longest = lengths.max() + 1
+    factors = np.cumprod(np.append(1.0, np.full(longest - 1, discount)))
 
     def estimated(policy: np.ndarray) -> tuple[np.ndarray, float]:
-        sums[:] = 0.0
-        with runtime.quiet():
-            weigh(weights, begins, policy[data.state, data.action] / data.behaviour_probability)
-            add_up(*sums, estimates, begins, data.reward, weights, times, int(weighted), discount)
-        whole = weights[begins[1:] - 1]
+        ratios = policy[data.state, data.action] / data.behaviour_probability
+        weights = np.concatenate([np.cumprod(one) for one in np.split(ratios, begins[1:-1])])
+        whole, estimates = weights[begins[1:] - 1], []
+        for of_episode in times:
+            of_row = of_episode[data.episode]
+            sums = np.bincount(step, of_row * (weights * data.reward), longest)
+            total = np.full(longest, of_episode.sum(dtype=float))
+            if weighted:
+                ended = np.bincount(lengths, of_episode * whole, longest)
+                total = np.bincount(step, of_row * weights, longest) + np.cumsum(ended)
+            means = np.divide(sums, total, out=np.zeros(longest), where=total > 0)
+            estimates.append(np.cumsum(factors * means)[-1])
         squares = np.square(whole).sum()
-        return estimates, whole.sum() ** 2 / squares if squares > 0 else 0.0
+        return np.array(estimates), whole.sum() ** 2 / squares if squares > 0 else 0.0
 
-    return _values(map(estimated, policies), shape, level)
+    return _values(data, q_values, epsilon, estimated, level)
 
 
-@checked_arguments
 def model_based(
     data: Dataset,
     q_values: np.ndarray,
-    discount: Discount = 0.9,
-    epsilon: Share = 0.0,
-    initial_q: InitialValue = 0.0,
-    resamples: Resamples = 200,
-    level: Share = 0.95,
+    discount: float = 0.9,
+    epsilon: float = 0.0,
+    initial_q: float = 0.0,
+    resamples: int = 200,
+    level: float = 0.95,
 ) -> PolicyValues:
     """Return the values of target policies in the empirical model of the data.
 
     This is the direct method (Jiang and Li, Doubly robust off-policy value evaluation for
     reinforcement learning, ICML 2016). Its variance is small, but it is biased for any amount of
     data if states are not Markov. Each resample has a separate model. Pairs of state and action
-    without data have the value `initial_q`. Other arguments are those of `importance_sampling`.
+    without data have the value `initial_q`. The discount must be below 1. Other arguments are those
+    of `importance_sampling`.
     """
-    policies, shape = _policies(data, q_values, epsilon)
     times = _times(data, resamples)
     model, first = EmpiricalModel.of(data, times), data.state[data.begins[:-1]]
     starts = times / times.sum(axis=1, keepdims=True, dtype=np.int64)  # shares of episodes
@@ -130,26 +119,28 @@ def model_based(
         values = (policy[first] * q[:, first]).sum(axis=-1)
         return (starts * values).sum(axis=1), np.nan
 
-    return _values(map(estimated, policies), shape, level)
+    return _values(data, q_values, epsilon, estimated, level)
 
 
 def _values(
-    of_policies: Iterable[tuple[np.ndarray, float]], shape: tuple[int, ...], level: float
+    data: Dataset,
+    q_values: np.ndarray,
+    epsilon: float,
+    estimated: Callable[[np.ndarray], tuple[np.ndarray, float]],
+    level: float,
 ) -> PolicyValues:
-    """Summarise, for each policy, its estimates (data, then resamples) and its sample size."""
-    tail, rows = (1.0 - level) / 2.0, []
-    for (value, *resampled), size in of_policies:
-        ends = np.quantile(resampled, (tail, 1.0 - tail)) if resampled else (np.nan, np.nan)
-        rows.append((value, *ends, size))
-    return PolicyValues(*(np.reshape(column, shape) for column in np.array(rows).T))
+    """Return the values of policies by a function of the probabilities of one policy's actions.
 
-
-def _policies(data: Dataset, q_values: np.ndarray, epsilon: float) -> tuple[np.ndarray, tuple]:
-    """Return action probabilities (policies, n_states, 5) and the leading shape of the tables."""
-    expect("data", data, Dataset)
+    It returns the estimates (of the data, then of each resample) and the effective sample size.
+    """
     tables = checked_values(q_values, data.task)
     probabilities = action_probabilities(tables, epsilon)
-    return probabilities.reshape(-1, *tables.shape[-2:]), tables.shape[:-2]
+    tail, rows = (1.0 - level) / 2.0, []
+    for policy in probabilities.reshape(-1, *tables.shape[-2:]):
+        (value, *resampled), size = estimated(policy)
+        ends = np.quantile(resampled, (tail, 1.0 - tail)) if resampled else (np.nan, np.nan)
+        rows.append((value, *ends, size))
+    return PolicyValues(*(np.reshape(column, tables.shape[:-2]) for column in np.array(rows).T))
 
 
 def _times(data: Dataset, resamples: int) -> np.ndarray:

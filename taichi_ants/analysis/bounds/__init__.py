@@ -1,1 +1,0 @@
-"""Bounds of ants and colonies, and simple policies to compare learned ones with."""
