@@ -61,11 +61,7 @@ class Named:
         return self._read(name)
 
 
-def _late(module: str) -> Any:
-    """Return a module that is imported at its first use, when a kernel compiles."""
-    return Named(lambda name: getattr(import_module(module), name))
-
-
-ti = _late("taichi")
-bits = _late("taichi_ants.arithmetic.random_bits")
-numbers = _late("taichi_ants.arithmetic.numbers")
+# Modules that are imported at their first use, when a kernel compiles.
+ti: Any = Named(lambda name: getattr(import_module("taichi"), name))
+bits: Any = Named(lambda name: getattr(import_module("taichi_ants.arithmetic.random_bits"), name))
+numbers: Any = Named(lambda name: getattr(import_module("taichi_ants.arithmetic.numbers"), name))
