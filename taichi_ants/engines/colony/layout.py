@@ -7,6 +7,7 @@ from dataclasses import fields
 from enum import IntEnum, auto
 from typing import Any
 
+from taichi_ants.errors import check_one_of
 from taichi_ants.features import arrays
 from taichi_ants.features.castes import CASTES
 from taichi_ants.features.feature import ANT, Array
@@ -182,12 +183,9 @@ def array_of(number: int, dense: bool) -> str:
     return f"field_{number}" if number else "level" if dense else "trail"
 
 
-def usual_schedule(n_worlds: int, capacity: int) -> str:
-    """Return the faster schedule for `n_worlds` worlds with `capacity` slots each."""
+def schedule_of(given: str | None, n_worlds: int, capacity: int, threads: int) -> tuple[str, int]:
+    """Return a schedule, by default the faster one, and the number of chunks of ants in a world."""
     large = capacity >= (_LARGE_ALONE if n_worlds == 1 else _LARGE_COLONY)
-    return "by_chunk" if large else "by_world"
-
-
-def chunks_of(schedule: str, threads: int) -> int:
-    """Return the number of chunks of ants in a world."""
-    return _CHUNKS_PER_THREAD * threads if schedule == "by_chunk" else 1
+    schedule = ("by_chunk" if large else "by_world") if given is None else given
+    check_one_of("schedule", schedule, ("by_world", "by_chunk"))
+    return schedule, _CHUNKS_PER_THREAD * threads if schedule == "by_chunk" else 1

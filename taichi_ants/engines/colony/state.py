@@ -29,9 +29,8 @@ from taichi_ants.engines.colony.layout import (
     SumRow,
     WorldRow,
     array_of,
-    chunks_of,
     columns_of,
-    usual_schedule,
+    schedule_of,
 )
 from taichi_ants.engines.layout import compass_of, note_best_actions
 from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole
@@ -150,9 +149,8 @@ class ColonyState:
         self.seeds = arguments.checked_seeds(seeds)
         running = runtime.start(threads, arch)
         runtime.check_on_cpu(running, "colonies run")
-        schedule = usual_schedule(len(self.seeds), self.capacity) if schedule is None else schedule
-        check_one_of("schedule", schedule, ("by_world", "by_chunk"))
-        self.schedule, self.chunks = schedule, chunks_of(schedule, running.threads)
+        sizes = len(self.seeds), self.capacity, running.threads
+        self.schedule, self.chunks = schedule_of(schedule, *sizes)
         self.n_kinds, self.n_nests = max(1, len(task.foods)), 0
         worlds = self.checked_worlds(world)
         self.n_nests, shape = worlds[0].n_nests, () if table is None else table.shape
