@@ -2,10 +2,10 @@
 
 All ants act at random in the paper's world. `step` and `rollout` get actions that were drawn
 before. "policy" is a rollout that draws them itself, as the engine does, with epsilon 1. Rollouts
-have up to two million steps of all environments, and reuse their arrays. The command measures
-all in turn, several times. The table contains medians: steps per second by the wall clock, and
-processor time per step of all threads together. Ratios are those of the engine's processor time,
-which other programs hardly change, and of its wall-clock time.
+have up to two million steps of all environments. The command measures all in turn, several times.
+The table contains medians: steps per second by the wall clock, and processor time per step of all
+threads together. Ratios are those of the engine's processor time, which other programs hardly
+change, and of its wall-clock time.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ def vector(num_envs: int) -> dict[str, Callable[[], int]]:
     env.reset(seed=0)
     length = max(1, min(_MOST_LENGTH, _STEPS_OF_ROLLOUT // num_envs))
     actions = np.random.default_rng(0).integers(0, 5, (length, num_envs))
-    given, drawn = env.rollout(actions), env.rollout("random", length)  # compiles kernels
+    env.rollout(actions)  # compiles the kernels
+    env.rollout("random", length)
     rollouts = max(1, _STEPS // (length * num_envs))
 
     def step() -> int:
@@ -58,12 +59,12 @@ def vector(num_envs: int) -> dict[str, Callable[[], int]]:
 
     def rollout() -> int:
         for _ in range(rollouts):
-            env.rollout(actions, out=given)
+            env.rollout(actions)
         return rollouts * length * num_envs
 
     def policy() -> int:
         for _ in range(rollouts):
-            env.rollout("random", length, epsilon=1.0, out=drawn)
+            env.rollout("random", length, epsilon=1.0)
         return rollouts * length * num_envs
 
     return {f"{num_envs} {one.__name__}": one for one in (step, rollout, policy)}

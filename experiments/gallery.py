@@ -87,8 +87,8 @@ def make_gallery(settings: argparse.Namespace) -> None:
     """Make all pictures, and replace existing ones."""
     for name, arguments in GALLERY.items():
         path = settings.folder / "renders" / name
-        script, chosen = drawing([*arguments, "--out", str(path)])
-        script.show(chosen)
+        draw, chosen = drawing([*arguments, "--out", str(path)])
+        draw(chosen)
     with chromium() as browser:
         if browser is not None:
             make_viewer(settings.folder / "docs" / "figures", browser)
@@ -98,11 +98,11 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 
 def drawing(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
-    """Return the module that draws a picture, and its settings."""
+    """Return the function that draws a picture, and its settings."""
     if arguments[0] in ("episode", "colony"):
-        return render, render.parse_arguments(arguments)
+        return render.run, render.parse_arguments(arguments)
     script = import_module(arguments[0])
-    return script, script.parse_arguments(arguments[1:])
+    return script.show, script.parse_arguments(arguments[1:])
 
 
 @contextmanager

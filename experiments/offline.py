@@ -20,7 +20,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from pathlib import Path
 
     import numpy as np
-    import off_policy
 
     from taichi_ants import Colony, TrainingConfig, evaluate, load_policy, offline, train, worlds
     from taichi_ants.analysis.statistics import bootstrap_interval
@@ -45,10 +44,10 @@ SIZES = (1000, 3000, 10_000, 30_000, 100_000)
 # Off-policy evaluation: target policies explore a little; rewards after 100 steps hardly count.
 HORIZON, DISCOUNT, EPSILON = 100, 0.95, 0.1
 INTERVALS = {"resamples": 40, "level": 0.9}
-JUDGES: dict[str, Callable[..., off_policy.PolicyValues]] = {
-    "importance sampling": partial(off_policy.importance_sampling, weighted=False, **INTERVALS),
-    "weighted": partial(off_policy.importance_sampling, weighted=True, **INTERVALS),
-    "model": partial(off_policy.model_based, **INTERVALS),
+JUDGES: dict[str, Callable[..., offline.PolicyValues]] = {
+    "importance sampling": partial(offline.importance_sampling, weighted=False, **INTERVALS),
+    "weighted": partial(offline.importance_sampling, weighted=True, **INTERVALS),
+    "model": partial(offline.model_based, **INTERVALS),
 }
 
 # Colonies of 64 ants, three far piles; those with a lifespan have births.
@@ -150,7 +149,7 @@ def _returns(table: np.ndarray, episodes: int, seed: int, epsilon: float) -> np.
     return record(WORLD, table, episodes, seed, 600, STILL, epsilon).returns(DISCOUNT)
 
 
-def _scores(found: off_policy.PolicyValues, true: np.ndarray) -> tuple[float, ...]:
+def _scores(found: offline.PolicyValues, true: np.ndarray) -> tuple[float, ...]:
     """Return Spearman's correlation, loss, coverage of intervals, and effective sample size."""
     from scipy.stats import rankdata
 

@@ -44,18 +44,13 @@ def unusable(registered: Any, fault: object) -> AntsError:
     )
 
 
-def missing(feature: str, module: str, extra: str) -> str:
-    """Return the message that `who` needs a module that an extra of this package installs."""
-    how = f'run pip install -e ".[{extra}]" in your clone'
-    return f"{feature} needs {module}, which cannot be imported; {how}."
-
-
 def imported(feature: str, module: str, extra: str) -> Any:
-    """Return a module that only `who` needs; AntsError if it cannot be imported."""
+    """Return a module that an extra of this package installs; AntsError if it is missing."""
     try:
         return import_module(module)
     except ImportError as error:
-        raise AntsError(missing(feature, module, extra)) from error
+        how = f'run pip install -e ".[{extra}]" in your clone'
+        raise AntsError(f"{feature} needs {module}, which cannot be imported; {how}.") from error
 
 
 class _Short(reprlib.Repr):

@@ -18,28 +18,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from taichi_ants.errors import (
-    AntsError,
-    as_array,
-    check_one_of,
-    count,
-    entries_of,
-    is_flag,
-    refuse,
-)
+from taichi_ants import settings
+from taichi_ants.errors import AntsError, as_array, check_one_of, count, entries_of, is_flag, refuse
 from taichi_ants.features import FEATURES
-from taichi_ants.settings import (
-    Setting,
-    Settings,
-    Share,
-    all_of,
-    declared,
-    flat,
-    named_groups,
-    nested,
-    not_a_setting,
-    settings_of_entry,
-)
+from taichi_ants.settings import Setting, Settings, Share, declared
 from taichi_ants.task import Task
 from taichi_ants.task.field import TRAIL
 from taichi_ants.task.model import Model
@@ -52,7 +34,7 @@ if TYPE_CHECKING:
 One = TypeVar("One", bound="ShorthandSettings")
 _MOST = 2**24  # ants, see `arguments.MAX_ANTS`
 _CELLS = Setting("cells, each [x, y, z], or the name of a region", or_region=True)
-_NAMED = {group.name: group for group in named_groups(Task)}
+_NAMED = {group.name: group for group in settings.named_groups(Task)}
 _SHORT = {  # the short forms of interventions, by the setting that such a value is
     "number": "a whole number of ants",
     "share": "a share such as 0.5",
@@ -219,17 +201,14 @@ class SetAnts(Intervention, path="ants", short_for=("number",)):
 class Place(Intervention, path="place", short_for=("cells",)):
     """Place rock or food on cells, or the queen on one cell; ants there move aside.
 
-    Rock and food leave out the cells of queens, and cells whose ant has no room nearby.
+    Rock and food leave out the cells of queens, and cells whose ant has no room nearby. Without
+    `nest` or `kind`, the queen is that of nest 0, and the food is of the first kind.
     """
 
     what: Annotated[Literal["rock", "food", "queen"], Setting("thing to place")]
     cells: Annotated[Sequence, _CELLS]
-    nest: Annotated[
-        int | None, Setting("nest of the queen, by default 0", least=0, only=("what", "queen"))
-    ] = None
-    kind: Annotated[
-        str | None, Setting("kind of food; the first if left out", only=("what", "food"))
-    ] = None
+    nest: Annotated[int | None, Setting("nest of a queen", least=0, only=("what", "queen"))] = None
+    kind: Annotated[str | None, Setting("kind of food", only=("what", "food"))] = None
 
     def check(self) -> None:
         super().check()
@@ -267,12 +246,10 @@ class Clear(Intervention, path="clear", short_for=("cells",)):
 
 @dataclass(frozen=True)
 class SetTrail(Intervention, path="trail", short_for=("level",)):
-    """Set the trail, or a further field, of cells without rock; level 0 clears it."""
+    """Set the trail, or a further field, of cells, by default all, without rock; 0 clears it."""
 
     level: Annotated[int, Setting("trail level", least=0, most=MAX_DEPOSIT)]
-    cells: Annotated[
-        Sequence | None, _CELLS.replace(Setting("cells, or a region; all if left out"))
-    ] = None
+    cells: Annotated[Sequence | None, _CELLS] = None
     field: Annotated[str, Setting("name of the field")] = TRAIL
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
@@ -296,12 +273,12 @@ class SetTask(Intervention, path="task"):
         values = []
         for name, value in self.values:
             group, entry, *_ = [*name.split("."), "", ""]
-            settings = {setting.path: setting for setting in all_of(Task)}
+            known = {setting.path: setting for setting in settings.all_of(Task)}
             if entry and group in _NAMED:
-                settings = settings_of_entry(_NAMED[group], entry)
-            if (setting := settings.get(f"task.{name}")) is None:
-                known = [path.removeprefix("task.") for path in settings]
-                raise AntsError(f"`task.{name}` {not_a_setting(name, known)}")
+                known = settings.settings_of_entry(_NAMED[group], entry)
+            if (setting := known.get(f"task.{name}")) is None:
+                names = [path.removeprefix("task.") for path in known]
+                raise AntsError(f"`task.{name}` {settings.not_a_setting(name, names)}")
             values.append((name, setting.checked(value)))
         object.__setattr__(self, "values", tuple(sorted(values)))
 
@@ -309,7 +286,7 @@ class SetTask(Intervention, path="task"):
     def converted(cls, value: Any) -> Any:
         if not isinstance(value, Mapping):
             return value
-        numbers = flat({k: v for k, v in value.items() if isinstance(k, str)})
+        numbers = settings.flat({k: v for k, v in value.items() if isinstance(k, str)})
         return cls(tuple(numbers.items()))
 
     def as_dict(self) -> dict[str, Any]:
@@ -317,7 +294,7 @@ class SetTask(Intervention, path="task"):
 
     def changed(self, task: Task) -> Task:
         """Return the task with the new values."""
-        return task.replace(**nested(dict(self.values)))
+        return task.replace(**settings.nested(dict(self.values)))
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         changed = self.changed(task)
@@ -326,7 +303,7 @@ class SetTask(Intervention, path="task"):
             for rules in (task, changed)
         )
         if castes != new_castes or Model(task, learns) != Model(changed, learns):
-            old, new = flat(task.as_dict()), flat(changed.as_dict())
+            old, new = settings.flat(task.as_dict()), settings.flat(changed.as_dict())
             names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
             changes = (f"{name} from {old.get(name)!r} to {new.get(name)!r}" for name in names)
             raise AntsError(
@@ -368,9 +345,9 @@ def from_dict(facts: Any) -> Intervention:
     if not isinstance(facts, Mapping) or len(facts) != 1:
         names = ", ".join(INTERVENTIONS)
         refuse("an intervention", facts, f"a table with the name of one intervention: {names}")
-    ((name, settings),) = facts.items()
+    ((name, values),) = facts.items()
     check_one_of("the name of an intervention", name, tuple(INTERVENTIONS))
-    return INTERVENTIONS[name].from_dict(settings)
+    return INTERVENTIONS[name].from_dict(values)
 
 
 def flat_indices(grid: AxialGrid, cells: Sequence[Any]) -> list[int]:

@@ -6,6 +6,7 @@ import os
 import sys
 import warnings
 from contextlib import suppress
+from functools import cache
 
 
 def prepare_for_taichi() -> None:
@@ -36,14 +37,9 @@ def is_writable_folder(path: str) -> bool:
     return os.path.isdir(path) and os.access(path, os.W_OK | os.X_OK)
 
 
+@cache
 def fallback_folder() -> str:
-    """Return a temporary folder that belongs to this user."""
+    """Return a new temporary folder, in which other users cannot plant kernels."""
     import tempfile
 
-    user = os.getuid() if hasattr(os, "getuid") else 0
-    folder = os.path.join(tempfile.gettempdir(), f"taichi_ants-{user}")
-    with suppress(OSError):
-        os.makedirs(folder, mode=0o700, exist_ok=True)
-    if is_writable_folder(folder) and os.lstat(folder).st_uid == user:
-        return folder
-    return tempfile.mkdtemp(prefix="taichi_ants-")  # other users could plant kernels in `folder`
+    return tempfile.mkdtemp(prefix="taichi_ants-")

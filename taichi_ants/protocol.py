@@ -32,9 +32,7 @@ class ProtocolEvent(ShorthandSettings):
     remove_ants: Annotated[language.RemoveAnts | None, Setting("ants to remove")] = None
     add_ants: Annotated[language.AddAnts | None, Setting("ants to add")] = None
     ants: Annotated[language.SetAnts | None, Setting("new number of ants")] = None
-    clear: Annotated[language.Clear | None, Setting("cells from which to remove rock and food")] = (
-        None
-    )
+    clear: Annotated[language.Clear | None, Setting("cells to clear of rock and food")] = None
     move: Annotated[language.Move | None, Setting("rock, food or queen to move")] = None
     place: Annotated[language.Place | None, Setting("rock, food or queen to place")] = None
     trail: Annotated[language.SetTrail | None, Setting("trail to lay or to clear")] = None
@@ -80,8 +78,7 @@ class At(ProtocolEvent, path="at"):
 
     def times(self, length: int) -> range:
         """Return the tick."""
-        tick = self._within("tick", length)
-        return range(tick, tick + 1)
+        return range(self._within("tick", length), self.tick + 1)
 
 
 @dataclass(frozen=True)

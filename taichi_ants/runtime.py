@@ -6,35 +6,44 @@ Importing the package does not start Taichi; the first call that needs a kernel 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import gc
 import io
 import math
 import os
+import platform
 import textwrap
 import threading
 import time
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import ModuleType
-from typing import Any
+from types import ModuleType, SimpleNamespace
+from typing import Any, NamedTuple
 
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.process_variables import fallback_folder, is_writable_folder
-from taichi_ants.subnormals import Flushing
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
 _LONGEST_LOCK = 60.0  # seconds
+# The functions of the module textwrap that Taichi uses; they format lines once.
+_TEXTWRAP = SimpleNamespace(fill=cache(textwrap.fill), dedent=cache(textwrap.dedent))
+
+_Modes = ctypes.c_uint32 * 4  # C's `femode_t`; the second number is MXCSR
+_FLUSH_TO_ZERO = 1 << 15
+_read_modes: Any = lambda modes: None  # noqa: E731
+_set_modes: Any = _read_modes
+if platform.machine() == "x86_64" and platform.libc_ver()[0] == "glibc":
+    _libm = ctypes.PyDLL("libm.so.6")
+    _read_modes, _set_modes = _libm.fegetmode, _libm.fesetmode
 
 # A lock for environments in several threads, because Taichi compiles and launches for one thread.
 alone = threading.RLock()
 
 
-@dataclass(frozen=True)
-class Runtime:
+class Runtime(NamedTuple):
     """The settings of Taichi: `arch` is "cpu" or "cuda", `threads` the number of CPU threads."""
 
     arch: str
@@ -81,7 +90,10 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
         return wanted
     if running is not None:
         ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
-        if not ours or holds_data():
+        data = ti.Field, ti.Ndarray, ti.Texture  # which only the user's program creates
+        # There are half a million objects, but only a few thousand types.
+        kinds = {type(thing) for thing in gc.get_objects()}
+        if not ours or any(issubclass(kind, data) for kind in kinds):
             why = "has fields or arrays" if ours else "was not started by taichi_ants"
             raise AntsError(
                 f"arch={wanted.arch!r}, threads={wanted.threads} requires a restart of Taichi, but "
@@ -105,24 +117,24 @@ def start_with_checks() -> None:
     _init(ti, Runtime("cpu", 1), debug=True, offline_cache=False)
 
 
-def holds_data() -> bool:
-    """Return whether Taichi has fields or arrays, which only the user's program creates."""
-    import taichi as ti
+class Flushing:
+    """A context in which this thread flushes subnormal numbers to zero, as those of Taichi do.
 
-    runtime, root = ti.lang.impl.get_runtime(), ti.lang.impl._root_fb
-    if runtime.prog is None:
-        return False
-    trees = range(runtime.prog.get_snode_tree_size())
-    return bool(
-        any(runtime.prog.get_snode_root(tree).get_num_ch() for tree in trees)
-        or runtime.global_vars  # fields that are declared but not placed
-        or not root.empty
-        or len(runtime.unfinalized_fields_builder) > 1  # one is the root
-        # There are half a million objects, but only a few thousand types.
-        or any(
-            issubclass(cls, (ti.Ndarray, ti.Texture)) for cls in set(map(type, gc.get_objects()))
-        )
-    )
+    On x86-64, Taichi sets the processor's flag for this in the thread that starts it and in its own
+    threads. Kernels also compute in the calling thread, whose other arithmetic keeps them.
+    """
+
+    def __init__(self) -> None:
+        self._kept, self._flushing = _Modes(), _Modes()
+        _read_modes(self._flushing)
+        self._flushing[1] |= _FLUSH_TO_ZERO
+
+    def __enter__(self) -> None:
+        _read_modes(self._kept)
+        _set_modes(self._flushing)
+
+    def __exit__(self, *_: object) -> None:
+        _set_modes(self._kept)
 
 
 @contextlib.contextmanager
@@ -144,7 +156,7 @@ def quiet() -> Iterator[None]:
     core.set_logging_level("error")
     marked, Context.get_pos_info = Context.get_pos_info, _line_of
     reads = kernel_impl.getsourcelines, kernel_impl.textwrap
-    kernel_impl.getsourcelines, kernel_impl.textwrap = _source_lines, _Textwrap
+    kernel_impl.getsourcelines, kernel_impl.textwrap = _source_lines, _TEXTWRAP
     running, config = ti.lang.impl.get_runtime(), ti.lang.impl.current_cfg()
     types = running.default_fp, running.default_ip  # those of `config` would be references
     try:
@@ -159,13 +171,6 @@ def quiet() -> Iterator[None]:
         Context.get_pos_info = marked
         kernel_impl.getsourcelines, kernel_impl.textwrap = reads
         core.set_logging_level(before)
-
-
-class _Textwrap:
-    """The functions of the module textwrap that Taichi uses; lines are formatted once."""
-
-    fill = staticmethod(cache(textwrap.fill))
-    dedent = staticmethod(cache(textwrap.dedent))
 
 
 @cache

@@ -16,7 +16,7 @@ import taichi_ants
 
 # From the ground up: a part imports parts of lower layers only. Each part stands here.
 LAYERS = (
-    {"errors", "process_variables", "subnormals"},
+    {"errors", "process_variables"},
     {"files", "grid", "registry", "settings"},
     {"arithmetic"},
     {"kernel_functions"},

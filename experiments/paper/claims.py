@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,19 @@ from paper.quantities import Quantity, grids_of
 from taichi_ants.analysis.findings import Criterion, Finding, Verdict, judge, weakest
 from taichi_ants.analysis.tables import Table, interval, number, sentence, tally
 from taichi_ants.files import tomllib
+
+
+def in_words(criterion: Criterion) -> str:
+    """Return a criterion in words, for tables."""
+    low, high, margin = criterion.low, criterion.high, criterion.margin
+    if margin is not None:
+        limit = "" if high == math.inf else f" and at most {high:g}"
+        return f"above {low:g}{limit}, margin {margin:g}"
+    if low == -math.inf:
+        return f"at most {high:g}"
+    if high == math.inf:
+        return f"at least {low:g}"
+    return f"from {low:g} to {high:g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +58,7 @@ class Claim:
     @property
     def asked(self) -> str:
         """The criterion in words."""
-        return f"{self.estimator} {self.criterion.words} {self.quantity.unit}"
+        return f"{self.estimator} {in_words(self.criterion)} {self.quantity.unit}"
 
 
 # Arguments of quantities that are not measures, by their names in the file.
@@ -115,7 +129,7 @@ def claims_rows(audit: Audit) -> list[dict[str, Any]]:
             "section": claim.section,
             "statement": claim.statement,
             "quantity": claim.tested_on,
-            "criterion": claim.criterion.words,
+            "criterion": in_words(claim.criterion),
             "unit": claim.quantity.unit,
             "delivery": delivery,
             "estimator": claim.estimator,

@@ -58,10 +58,8 @@ class EpisodeBounds:
     """
 
     def __init__(self, world: World, task: Task) -> None:
-        what = "an exact bound"
-        refuse_unsupported(what, world.uses() | task.uses(), SUPPORTS)
-        changes = task.evaporation_in_training and task.pheromone.evaporation != "none"
-        if changes:
+        refuse_unsupported("an exact bound", world.uses() | task.uses(), SUPPORTS)
+        if task.evaporation_in_training and task.pheromone.evaporation != "none":
             raise AntsError(
                 "trails evaporate in training, but exact bounds require constant trails; set "
                 "`task.evaporation_in_training` to False."

@@ -63,18 +63,6 @@ class Criterion:
         reaches_margin = small is not None and -small <= high and low <= small
         return Verdict.CONTRADICTED if outside and not reaches_margin else Verdict.UNDECIDED
 
-    @property
-    def words(self) -> str:
-        """The criterion in words, for tables."""
-        if self.margin is not None:
-            limit = "" if self.high == np.inf else f" and at most {self.high:g}"
-            return f"above {self.low:g}{limit}, margin {self.margin:g}"
-        if self.low == -np.inf:
-            return f"at most {self.high:g}"
-        if self.high == np.inf:
-            return f"at least {self.low:g}"
-        return f"from {self.low:g} to {self.high:g}"
-
 
 def above(margin: float = 0.0) -> Criterion:
     """Return the criterion of a difference above its margin."""

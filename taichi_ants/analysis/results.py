@@ -10,7 +10,6 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import means_in_words
 from taichi_ants.analysis.statistics import bootstrap_interval, estimates
 from taichi_ants.analysis.tables import Table, plain_text, sentence
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
+from taichi_ants.errors import AntsError, checked_whole, expect, shown
 from taichi_ants.measures.tidy import Measured, Tidy, checked_measure, last_rows, parts_of
 
 if TYPE_CHECKING:
@@ -148,9 +147,7 @@ def summary(result: Tidy, last: int | None = None) -> Summary:
     return Summary(tuple(rows))
 
 
-def plot(
-    results: Tidy | Mapping[str, Tidy], *measures: str, path: str | Path | None = None
-) -> Figure:
+def plot(results: Tidy | Mapping[str, Tidy], *measures: str) -> Figure:
     """Return a figure of means over seeds with 95 % intervals, a panel for each measure.
 
     The horizontal axis is the tick if episodes have several rows, which are then averaged over
@@ -160,15 +157,10 @@ def plot(
         results: A result of `Colony.run`, `train` or `evaluate`, or several by name, with the same
             seeds and measures, to draw into the same panels.
         measures: Names of measures; none for the usual ones.
-        path: A PNG file, to which the figure is written as well.
 
     Raises:
-        AntsError: A result does not have a measure, the seeds differ, or the file cannot be
-            written.
+        AntsError: A result does not have a measure, or the seeds differ.
     """
-    if path is not None:
-        expect("path", path, str, Path)
-        check_one_of("the suffix of path", Path(path).suffix, (".png",))
     tables = _tables_of(results if isinstance(results, Mapping) else {"": results})
     first, *others = tables.values()
     names = [part for name in measures for part in parts_of(first, name)]
@@ -198,8 +190,6 @@ def plot(
         entries = style.legend_entries([panels[0]]) if labels[1:] else {}
         caption = f"{means_in_words(len(first.seeds))}."
         style.frame(figure, f"Measures by {across}", caption, entries)
-    if path is not None:
-        style.save(figure, Path(path))
     return figure
 
 

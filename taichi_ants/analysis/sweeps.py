@@ -95,10 +95,7 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
     """Draw a measure against the first setting that varies, a line for each value of the others.
 
     `settings` are those that vary, for each of P points, `values` the measure, float64 (P, S), of S
-    seeds, and `words` its name.
-
-    Raises:
-        AntsError: The file (.png) cannot be written.
+    seeds, and `words` its name. Raises AntsError if the file (.png) cannot be written.
     """
     names = columns_of(settings)
     others = [name for name in names[1:] if len({str(row.get(name)) for row in settings}) > 1]
@@ -145,7 +142,7 @@ def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
             line.set_linestyle("none")
             axes.vlines(x, low, high, color=colour)
     if not numbers:
-        axes.set_xticks(range(len(ticks)), ticks)
+        axes.set_xticks(range(len(ticks)), [tick.replace("_", "\n") for tick in ticks])
     elif _far_apart(places):
         style.logarithmic(axes.xaxis, (1,))
         axes.set_xticks(sorted(set(places)))
@@ -162,9 +159,7 @@ def draw_design(
 
     `settings` are those of P points, `values` the measure, float64 (P, S), of S seeds, and `words`
     its name. A panel has means over an eighth of the points, or over those with the same choice.
-
-    Raises:
-        AntsError: The file (.png) cannot be written.
+    Raises AntsError if the file (.png) cannot be written.
     """
     means, rows = known_means(values), -(-len(names) // _COLUMNS)
     lines = {name: {words: _parts_of([row[name] for row in settings], means)} for name in names}
@@ -176,7 +171,7 @@ def draw_design(
         for axes, name in zip(panels.flat, names, strict=False):
             draw_lines(axes, lines[name], [*lines.values()])
             if axes.get_xscale() == "log":
-                style.logarithmic(axes.xaxis, (1,))  # instead of a tick for each mean
+                style.logarithmic(axes.xaxis, (1, 3))  # instead of a tick for each mean
             axes.set_xlabel(short(name, names))
         figure.supylabel(words)
         caption = (

@@ -8,10 +8,27 @@ docs/archives.md.
 from __future__ import annotations
 
 import argparse
+import zipfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, BinaryIO
 
+from taichi_ants import files
 from taichi_ants.errors import AntsError
+from taichi_ants.report.odd import odd_of
 from taichi_ants.studies import command_line
+from taichi_ants.studies.folder import finished
+
+RESULTS = "results"  # the folder of results in an archive
+_README = """# Archive of a study with Taichi Ants
+
+The results come from this command, which finished {finished}:
+
+    {command}
+
+To compute them again and compare every table and figure, install the versions in `requirements.txt`
+and run `taichi-ants reproduce FILE` with the name of this archive. `ODD.md` describes the model.
+"""
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -25,17 +42,35 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 
 def run(settings: argparse.Namespace) -> None:
-    """Write the archive, and print what it contains."""
-    from taichi_ants.files import check_writable_file, check_writable_folder
-    from taichi_ants.report.odd import odd_of
-    from taichi_ants.studies.archive import finished, write
-
-    out = settings.out or Path(f"{settings.folder.resolve()}.zip")
-    manifest = finished(settings.folder)
+    """Write the archive, and print what it contains; the same folder gives the same bytes."""
+    folder, out = settings.folder, settings.out or Path(f"{settings.folder.resolve()}.zip")
+    manifest = finished(folder)
     if out.exists() and not settings.force:
         raise AntsError(f"{str(out)!r} exists; choose another --out, or give --force.")
-    check_writable_folder(out.parent, out)
-    odd = odd_of(settings.folder, manifest)
-    number = write(check_writable_file(out), settings.folder, manifest, odd)
-    print(f"{out}: {number} files ({out.stat().st_size / 1e6:.1f} MB)")
+    texts = {"ODD.md": odd_of(folder, manifest), "requirements.txt": _requirements(manifest)}
+    texts["README.md"] = _README.format(**manifest)
+    contents = {name: text.encode() for name, text in texts.items()}
+    for path in filter(Path.is_file, folder.rglob("[!.]*")):
+        contents[f"{RESULTS}/{path.relative_to(folder).as_posix()}"] = path.read_bytes()
+
+    def save(file: BinaryIO) -> None:
+        with zipfile.ZipFile(file, "w") as archive:
+            for name, content in sorted(contents.items()):
+                entry = zipfile.ZipInfo(name)  # of 1980, because dates would change the bytes
+                entry.external_attr = 0o644 << 16
+                archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
+
+    files.write_atomically(out, save)
+    print(f"{out}: {len(contents)} files ({out.stat().st_size / 1e6:.1f} MB)")
     print(f"To repeat the study and compare: taichi-ants reproduce {out}")
+
+
+def _requirements(manifest: Mapping[str, Any]) -> str:
+    """Return the packages of a run with exact versions, in the format of pip's requirements."""
+    versions = dict(manifest["packages"])
+    own = f"taichi-ants=={versions.pop('taichi_ants')}"
+    if manifest["commit"]:
+        changed = "" if manifest["clean"] else ", with changes that are not committed"
+        own = f"# {own} ran from its source, commit {manifest['commit']}{changed}"
+    lines = [f"# Python {manifest['python']}", own, *(f"{n}=={v}" for n, v in versions.items())]
+    return "\n".join([*lines, ""])

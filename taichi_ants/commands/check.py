@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
 from itertools import chain
 
 from taichi_ants.studies import command_line
@@ -20,12 +19,10 @@ from taichi_ants.studies.command_line import whole_number
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = command_line.Parser(__doc__)
-    parser.add_argument(
-        "file", metavar="FILE", help="Python file with rules, observations or learners"
-    )
-    many = whole_number(1, 1_000_000)
+    add, many = parser.add_argument, whole_number(1, 1_000_000)
+    add("file", metavar="FILE", help="Python file with rules, observations or learners")
     about = "number of drawn inputs of each rule"
-    parser.add_argument("--inputs", type=many, default=4000, metavar="N", help=about)
+    add("--inputs", type=many, default=4000, metavar="N", help=about)
     return parser.parse_args(arguments)
 
 
@@ -35,6 +32,7 @@ def run(settings: argparse.Namespace) -> None:
     from taichi_ants.errors import AntsError
     from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import observations
+    from taichi_ants.testing import check_learner, check_observation, check_rule
 
     registries = rules, observations, learners
     before = [set(registry.names()) for registry in registries]
@@ -48,23 +46,14 @@ def run(settings: argparse.Namespace) -> None:
             f"the file {settings.file!r} registers no rules, observations or learners; register "
             "one, for example with taichi_ants.rules.register."
         )
+    of_rules = (check_rule(name, settings.inputs) for name in new[0])
     has_fault = False
-    for line, fault in _results(new[0], new[1], new[2], settings.inputs):
-        print(line, flush=True)
+    for comparison in chain(of_rules, map(check_observation, new[1])):
+        print(comparison, flush=True)
+        has_fault |= bool(comparison.difference)
+    for name in new[2]:
+        fault = check_learner(name)
+        print(f"{name}: 2000 steps: {fault or 'no fault'}", flush=True)
         has_fault |= bool(fault)
     if has_fault:
         sys.exit(1)
-
-
-def _results(
-    rules: list[str], observations: list[str], learners: list[str], inputs: int
-) -> Iterator[tuple[str, str]]:
-    """Yield a line and a fault, or an empty string, for each name."""
-    from taichi_ants.testing import check_learner, check_observation, check_rule
-
-    of_rules = (check_rule(name, inputs) for name in rules)
-    for comparison in chain(of_rules, map(check_observation, observations)):
-        yield str(comparison), comparison.difference
-    for name in learners:
-        fault = check_learner(name)
-        yield f"{name}: 2000 steps: {fault or 'no fault'}", fault

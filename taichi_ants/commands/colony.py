@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -90,10 +91,15 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def run(settings: argparse.Namespace) -> None:
     """Run a colony and print a summary; a signal stops it between two ticks."""
     from taichi_ants import Colony
+    from taichi_ants.files import check_writable_file
+    from taichi_ants.rendering import check_animation
 
     load_plugin(settings.plugin)
     files = settings.save, settings.render
-    check_places(*files)
+    if settings.render is not None:
+        check_animation(settings.render, FRAMES_PER_SECOND)
+    if settings.save is not None:
+        check_writable_file(settings.save)
     if settings.resume:
         colony = Colony.load(settings.resume, settings.threads, arch=settings.arch)
     else:
@@ -145,17 +151,6 @@ def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
     return base.replace(**command_line.given_settings(settings).get("task", {}))
 
 
-def check_places(save: str | None, render: str | None) -> None:
-    """Check, before the work begins, that the files of `live` can be written."""
-    from taichi_ants.files import check_writable_file
-    from taichi_ants.rendering import check_animation
-
-    if render is not None:
-        check_animation(render, FRAMES_PER_SECOND)
-    if save is not None:
-        check_writable_file(save)
-
-
 def live(
     colony: Colony,
     ticks: int,
@@ -171,21 +166,18 @@ def live(
     (.png) of the end, or an animation (.gif).
     """
     from taichi_ants.files import check_writable_folder
-    from taichi_ants.rendering import colony_snapshots, frames, save_animation, save_picture
+    from taichi_ants.rendering import colony_snapshots, frames, save_animation
     from taichi_ants.rendering.writers import is_picture
 
-    animated = render is not None and not is_picture(render)
-    interval = frame_interval if animated else ticks
+    still = render is None or is_picture(render)
+    passing = _pieces(colony, ticks, progress, stopped, ticks if still else frame_interval)
+    shown: Iterable[Any] = (s for _ in chain([0], passing) for s in colony_snapshots(colony))
     error: Exception | None = None
-    passing = _pieces(colony, ticks, progress, stopped, interval)
     try:
-        if render and animated:
-            shown = (s for _ in chain([0], passing) for s in colony_snapshots(colony))
+        if still:
+            shown = deque(shown, maxlen=1)
+        if render is not None:
             save_animation(render, frames(shown, task=colony.task), FRAMES_PER_SECOND)
-        for _ in passing:
-            pass
-        if render and not animated:
-            save_picture(render, next(frames(colony_snapshots(colony), task=colony.task)))
     except (AntsError, OSError) as raised:
         error = raised  # the colony is intact, because drawing happens between ticks
     if save is not None:
@@ -206,20 +198,18 @@ def _pieces(
 
     Yields after every `interval` ticks and at the end.
     """
-    begun, piece, passed, ends = colony.ticks, 1, 0, stopped()
-    while not ends:
+    piece, passed = 1, 0
+    while passed < ticks and not stopped():
         began = time.perf_counter()
         now = min(piece, ticks - passed, interval - passed % interval)
         colony.tick(now)
-        took, passed = time.perf_counter() - began, colony.ticks - begun
-        if took > _PIECE_SECONDS:
-            piece = max(1, piece // 2)
-        elif now == piece:
-            piece *= 2
-        ends = passed == ticks or stopped()
-        if ends or passed % interval == 0:
-            yield colony.ticks
+        passed += now
+        piece = max(1, piece // 2) if time.perf_counter() - began > _PIECE_SECONDS else 2 * piece
         progress(passed / ticks)
+        if passed % interval == 0:
+            yield passed
+    if passed % interval:
+        yield passed
 
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:

@@ -52,20 +52,18 @@ LEARNED = 20 * (1000 + 1) + 300
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
-    add = parser.add_argument
-    row = "folder of results, of which --row plays a run, instead of the live page"
-    add("folder", type=Path, nargs="?", metavar="FOLDER", help=row)
-    row = "row of the table of runs to play, from 1: the first episode of its evaluation"
-    add("--row", type=whole_number(1), metavar="N", help=row)
+    add, port = parser.add_argument, whole_number(0, 65535)
+    about = "folder of results, of which --row plays a run, instead of the live page"
+    add("folder", type=Path, nargs="?", metavar="FOLDER", help=about)
+    about = "row of the table of runs to play, from 1: the first episode of its evaluation"
+    add("--row", type=whole_number(1), metavar="N", help=about)
     files: dict[str, Any] = {"action": "extend", "nargs": "+", "default": [], "metavar": "FILE"}
-    offered = "policy files (.npz) to offer on the page, in addition to experiments/policies/"
-    add("--policy", **files, help=offered)
+    about = "policy files (.npz) to offer on the page, in addition to experiments/policies/"
+    add("--policy", **files, help=about)
     add("--session", metavar="FILE", help="resume a saved session")
-    port = whole_number(0, 65535)
-    free = "port of the page; 0 picks a free one"
-    add("--port", type=port, default=0, metavar="N", help=free)
-    closed = "do not open a browser (the default if the output is not a terminal)"
-    add("--no-browser", action="store_true", help=closed)
+    add("--port", type=port, default=0, metavar="N", help="port of the page; 0 picks a free one")
+    about = "do not open a browser (the default if the output is not a terminal)"
+    add("--no-browser", action="store_true", help=about)
     add("--duration", type=whole_number(1), metavar="N", help="end after N seconds")
     add("--plugin", metavar="FILE", help=PLUGIN)
     add_threads(parser)

@@ -16,7 +16,6 @@ from taichi.types import ndarray_type
 
 from taichi_ants import runtime
 from taichi_ants.errors import AntsError
-from taichi_ants.subnormals import Flushing
 
 
 class Launch:
@@ -35,7 +34,7 @@ class Launch:
         # Not a reference to its program, which would outlive a reset of Taichi.
         self._compiled: Any = None
         self._known: dict[str, Any] = {}  # the present values of the pack and the context
-        self._flushing = Flushing()
+        self._flushing = runtime.Flushing()
 
     def __call__(self, values: Mapping[str, Any]) -> None:
         """Launch with these values; names and types are always the same, arrays C-contiguous."""

@@ -169,11 +169,9 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
     mask is 1 for actions that succeed unless another ant comes first.
 
     After `max_steps` steps, all ants of a world are truncated, and all autoreset modes reset whole
-    worlds. A delivery does not reset the world, and its ant continues from its cell. If the task's
-    `delivery` is "terminates", the default, the ant is nevertheless `terminated` and its next
-    observation begins its next episode, so that later rewards do not count for the delivery. This
-    requires the mode `SAME_STEP`, because the next episode begins in the same step. If `delivery`
-    is "truncates", no ant is terminated, and all modes are possible.
+    worlds. After a delivery, the ant continues from its cell. If the task's `delivery` is
+    "terminates", the default, its next observation nevertheless begins its next episode, which
+    requires the mode `SAME_STEP`. If it is "truncates", no ant is terminated.
 
     ## Arguments
     - `num_envs`: The number of ants in all worlds together, a multiple of `ants`.
@@ -204,7 +202,7 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         # The number of ants is fixed.
         supports = SUPPORTS - {"life.births", "life.lifespan"}
         worlds = ColonyWorlds(n // ants, arguments, ants, start, supports=supports)
-        super().__init__(worlds, n // ants, n, autoreset_mode, render_mode)
+        super().__init__(worlds, n, autoreset_mode)
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
         if worlds.task.delivery == "terminates" and not same_step:
             raise AntsError(

@@ -7,20 +7,16 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import seeding
+from pettingzoo import ParallelEnv
+from pettingzoo.utils.env_logger import EnvLogger
 
 from taichi_ants.envs.colony import MAX_STEPS, ColonyWorlds
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.vector import METADATA, Arguments, Place, Rules
-from taichi_ants.errors import missing, shown
+from taichi_ants.errors import shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Life
 from taichi_ants.task.constants import N_ACTIONS
-
-try:
-    from pettingzoo import ParallelEnv
-    from pettingzoo.utils.env_logger import EnvLogger
-except ImportError as error:
-    raise ImportError(missing("colony_v0", "pettingzoo", "pettingzoo")) from error
 
 Infos = dict[str, dict[str, Any]]  # by agent and name
 
@@ -32,8 +28,7 @@ class HexColonyParallelEnv(ParallelEnv):
     ant that is born gets the next number, is in `agents` from its birth, and acts from the next
     step. All agents act at once. Spaces, rewards of an ant's own action, and infos except `reason`
     are those of `HexForageEnv`. `action_mask` is 1 for actions that succeed unless another ant
-    comes first, and `event` is also NONE in the step of an ant's birth. `state()` is a map of the
-    whole world, for centralised critics.
+    comes first, and `event` is also NONE in the step of an ant's birth.
 
     An ant that dies of age is terminated and leaves `agents`; its number is not used again. After
     `max_steps` steps, all ants are truncated. A delivery does not end the episode, for any
@@ -77,8 +72,6 @@ class HexColonyParallelEnv(ParallelEnv):
         self.action_spaces: dict[str, spaces.Space] = {
             name: spaces.Discrete(N_ACTIONS) for name in self.possible_agents
         }
-        form = (4, colony.grid.height, colony.grid.width)
-        self.state_space = spaces.Box(0, 2**31 - 1, form, np.int32)
 
     def observation_space(self, agent: str) -> spaces.Space:
         """Return the observation space, the same object for each agent."""
@@ -168,21 +161,6 @@ class HexColonyParallelEnv(ParallelEnv):
             name: {key: values[k] for key, values in facts.items()} for k, name in enumerate(names)
         }
         return observations, infos
-
-    def state(self) -> np.ndarray:
-        """Return a map of the world, int32 (4, rows, columns), in axial coordinates.
-
-        Its layers are the content of each cell (0 nothing, 5 rock or outside, 7 food, 13 queen);
-        its trail level, rounded down; its ant (1 without food, 2 with food); the ant's heading.
-        """
-        if not self._begun:
-            EnvLogger.error_state_before_reset()
-        now = self._worlds.colony.snapshot()
-        layers = np.zeros((4, now.grid.size), np.int32)
-        layers[0], layers[1] = now.ground, now.trail
-        layers[2, now.ant_cells] = 1 + now.ant_carries
-        layers[3, now.ant_cells] = now.ant_headings
-        return layers.reshape(self.state_space.shape)
 
     def render(self) -> np.ndarray | None:
         """Return a picture, uint8 (height, width, 3), or None without a render mode."""

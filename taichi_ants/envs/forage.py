@@ -22,13 +22,12 @@ from taichi_ants.envs.vector import (
     Ants,
     AntVectorEnv,
     Arguments,
-    OfAnts,
     Place,
     Rules,
     Step,
     Worlds,
 )
-from taichi_ants.errors import as_array, check_one_of, checked_whole, expect, shown, whole
+from taichi_ants.errors import check_one_of, checked_whole, shown, whole
 from taichi_ants.features.support import CHOICE, LONE
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
@@ -106,7 +105,7 @@ class LoneAnts(Ants):
         return self._scene.draw(now, rendering.Status(facts, state, observation=sees))
 
 
-class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
+class HexForageEnv(gymnasium.Env[Any, Any]):
     """An ant on a hexagonal grid that searches for food and carries it to its queen.
 
     The rules are those of "Ants and Reinforcement Learning Algorithms"; see
@@ -167,10 +166,10 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
         options.
         """
         super().reset(seed=seed)
-        if seed is None and not self._begun:
+        if seed is None and not self._ants.begun:
             seed = int(self.np_random.integers(2**63))
         self._ants.begin(np.ones(1, bool), [seed])
-        self._begun = True
+        self._ants.begun = True
         return self._seen()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -183,7 +182,7 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
             ResetNeeded: No episode has begun, or it has ended.
             InvalidAction: The action does not exist.
         """
-        self._check_begun("step()")
+        self._ants.check_begun("step()")
         if self._arrays["results"][0] >= TRUNCATED:
             raise ResetNeeded("the episode has ended; call reset() before step().")
         if not self.action_space.contains(action):
@@ -206,12 +205,12 @@ class HexForageEnv(OfAnts, gymnasium.Env[Any, Any]):
 
     def action_masks(self) -> np.ndarray:
         """Return `info["action_mask"]` as bool (5,), for MaskablePPO of sb3-contrib."""
-        self._check_begun("action_masks()")
+        self._ants.check_begun("action_masks()")
         return ACTION_MASKS[self._arrays["paper_states"][0]].astype(bool)
 
     def render(self) -> Any:
         """Return a picture, uint8 (720, 1280, 3), or None without a render mode."""
-        self._check_begun("render()")
+        self._ants.check_begun("render()")
         return None if self.render_mode is None else self._ants.draw(0)
 
 
@@ -245,7 +244,7 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         n = checked_whole("num_envs", num_envs)
         arguments = Arguments(world, task, max_steps, observation_format, render_mode)
         ants = LoneAnts(n, delivery, arguments)
-        super().__init__(ants, n, n, autoreset_mode, render_mode)
+        super().__init__(ants, n, autoreset_mode)
 
     def rollout(
         self,
@@ -254,7 +253,6 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         *,
         epsilon: float = 0.0,
         seed: int | None = None,
-        out: Rollout | None = None,
     ) -> Rollout:
         """Return the results of several steps, with given actions or by a policy.
 
@@ -270,8 +268,6 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
             epsilon: The probability with which an ant that follows a policy acts at random.
             seed: The seed of the policy's random numbers, which also break ties. None draws one
                 from `np_random`, which `reset(seed=...)` seeds.
-            out: An earlier rollout of the same size. This call overwrites its arrays, instead of
-                creating new ones.
 
         Raises:
             ResetNeeded: No episode has begun, or autoreset_mode is "Disabled" and one has ended.
@@ -284,18 +280,11 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         shape, table = (length, n), ants.shown.table
         into = Rollout(
             np.empty((length + 1, n, *table.shape[1:]), table.dtype),
-            np.empty(shape, np.int64),
+            np.empty(shape, np.int64) if actions is None else actions,
             *(np.empty(shape), np.empty(shape, bool), np.empty(shape, bool)),
             events=np.empty(shape, np.uint8),
             final_observations=table[:0],
         )
-        if out is not None:
-            expect("out", out, Rollout)
-            for name, mine, wanted in zip(into._fields[:-1], out, into, strict=False):
-                as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
-            into = out
-        if actions is not None:
-            into = into._replace(actions=actions)
         if q_values is not None:
             drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
             best = q_values >= q_values.max(axis=1, keepdims=True)

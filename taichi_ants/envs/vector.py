@@ -66,9 +66,10 @@ class Ants(ABC):
         max_steps: The step limit of an episode.
         shown: The format of observations.
         mode: The autoreset mode of vector environments.
+        begun: Whether there was a reset.
     """
 
-    mode = AutoresetMode.DISABLED
+    mode, begun = AutoresetMode.DISABLED, False
 
     def __init__(
         self,
@@ -84,8 +85,9 @@ class Ants(ABC):
             task = Task.named()[task]
         self.task = task = checked_task(task, what, supports, instead)
         self.worlds = _worlds_of(arguments.world, n_worlds, supports)
-        if arguments.render_mode is not None:
-            check_one_of("render_mode", arguments.render_mode, METADATA["render_modes"])
+        self.n_worlds, self.render_mode = n_worlds, arguments.render_mode
+        if self.render_mode is not None:
+            check_one_of("render_mode", self.render_mode, METADATA["render_modes"])
         self.max_steps = checked_max_steps(arguments.max_steps, task)
         self.shown = Shown(task.sees, arguments.observation_format)
         self._scene: Any = None  # of `draw`
@@ -117,18 +119,20 @@ class Ants(ABC):
     def draw(self, world: int) -> Any:
         """Return a picture of a world."""
 
+    def check_begun(self, what: str) -> None:
+        """Raise ResetNeeded if there was no reset."""
+        if not self.begun:
+            raise ResetNeeded(f"no episode has begun; call reset() before {what}.")
+
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "_scene": None}  # `draw` creates it again
 
 
 def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World, ...]:
     entries = [world] if isinstance(world, (str, os.PathLike, World)) else world
-    if not isinstance(entries, (list, tuple)) or not entries:
-        raise AntsError(
-            f"world is {shown(world)}; give the name of a world, a World, or a list of them."
-        )
-    if len(entries) > most:
-        raise AntsError(f"world lists {len(entries)} worlds; it must list at most {most}.")
+    if not isinstance(entries, (list, tuple)) or not 0 < len(entries) <= most:
+        several = f", or a list of 1 to {most} of them" if most > 1 else ""
+        raise AntsError(f"world is {shown(world)}; give the name of a world or a World{several}.")
     built = []
     for entry in entries:
         if not isinstance(entry, World):
@@ -139,18 +143,7 @@ def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World,
     return tuple(built)
 
 
-class OfAnts:
-    """Base of environments, which know whether they were reset."""
-
-    _ants: Ants
-    _begun = False
-
-    def _check_begun(self, what: str) -> None:
-        if not self._begun:
-            raise ResetNeeded(f"no episode has begun; call reset() before {what}.")
-
-
-class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
+class AntVectorEnv(VectorEnv[Any, Any, Any]):
     """Base of the vector environments.
 
     With k ants in each world, environment number w * k + i is ant number i of world number w. Each
@@ -160,19 +153,11 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
 
     metadata = METADATA
 
-    def __init__(
-        self,
-        ants: Ants,
-        n_worlds: int,
-        num_envs: int,
-        autoreset_mode: str | AutoresetMode,
-        render_mode: str | None,
-    ) -> None:
-        self._ants, self._n_worlds, self.num_envs = ants, n_worlds, num_envs
+    def __init__(self, ants: Ants, num_envs: int, autoreset_mode: str | AutoresetMode) -> None:
+        self._ants, self.num_envs, self.render_mode = ants, num_envs, ants.render_mode
         mode = getattr(autoreset_mode, "value", autoreset_mode)
         check_one_of("autoreset_mode", mode, [allowed.value for allowed in AutoresetMode])
         self.autoreset_mode = ants.mode = AutoresetMode(mode)
-        self.render_mode = render_mode
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.single_observation_space = ants.shown.space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -202,14 +187,14 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
             ResetNeeded: The first reset has a mask that leaves out worlds.
         """
         mask = self._mask(options)
-        resets = mask.reshape(self._n_worlds, -1)[:, 0]
+        resets = mask.reshape(self._ants.n_worlds, -1)[:, 0]
         super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
-        seeds = seeds_of(seed, self._n_worlds)
-        if not self._begun:
-            drawn = self.np_random.integers(2**63, size=self._n_worlds).tolist()
+        seeds = seeds_of(seed, self._ants.n_worlds)
+        if not self._ants.begun:
+            drawn = self.np_random.integers(2**63, size=self._ants.n_worlds).tolist()
             seeds = [a if b is None else b for a, b in zip(drawn, seeds, strict=True)]
         self._ants.begin(resets, seeds)
-        self._begun = True
+        self._ants.begun = True
         facts = self._ants.facts()
         return self._ants.shown.show(facts["state"]), self._infos(facts, mask)
 
@@ -218,11 +203,11 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         if mask is None:
             return self._all
         mask = as_array("reset_mask", mask, "b", (self.num_envs,))
-        by_world = mask.reshape(self._n_worlds, -1)
+        by_world = mask.reshape(self._ants.n_worlds, -1)
         if (by_world.any(axis=1) != by_world.all(axis=1)).any():
             raise ValueError("reset_mask has only some ants of a world; give all or none of them.")
         if not mask.all():
-            self._check_begun("a reset with a reset_mask")
+            self._ants.check_begun("a reset with a reset_mask")
         return mask
 
     def step(
@@ -255,22 +240,17 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
 
     def _waiting(self, method: str) -> np.ndarray:
         """Return the worlds at an episode's end; ResetNeeded if the method needs a reset before."""
-        self._check_begun(f"{method}()")
-        over = self._over
+        self._ants.check_begun(f"{method}()")
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:  # the next episodes have begun
+            return np.zeros(self._ants.n_worlds, bool)
+        over = self._ants.over()
         if self.autoreset_mode is AutoresetMode.DISABLED and over.any():
-            number = over.argmax() * (self.num_envs // self._n_worlds)
+            number = over.argmax() * (self.num_envs // self._ants.n_worlds)
             raise ResetNeeded(
                 f"the episode of environment {number} has ended; call reset() with "
                 f'options={{"reset_mask": ...}} before {method}().'
             )
         return over
-
-    @property
-    def _over(self) -> np.ndarray:
-        """Whether the episode of each world has ended, and the next one not begun, bool (W,)."""
-        if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            return np.zeros(self._n_worlds, bool)
-        return self._ants.over()
 
     def _infos(self, facts: dict[str, np.ndarray], have: np.ndarray) -> dict[str, Any]:
         infos: dict[str, Any] = dict(facts)
@@ -288,9 +268,11 @@ class AntVectorEnv(OfAnts, VectorEnv[Any, Any, Any]):
         """
         if self.render_mode is None:
             return None
-        self._check_begun("render()")
-        drawn = map(self._ants.draw, range(self._n_worlds))
-        return tuple(picture for picture in drawn for _ in range(self.num_envs // self._n_worlds))
+        self._ants.check_begun("render()")
+        drawn = map(self._ants.draw, range(self._ants.n_worlds))
+        return tuple(
+            picture for picture in drawn for _ in range(self.num_envs // self._ants.n_worlds)
+        )
 
 
 def seeds_of(seed: Any, n: int) -> Sequence[int | None]:

@@ -1,7 +1,8 @@
 """Atomic writing of files, and reading with limits on their size.
 
 All functions raise an AntsError that names the file if it cannot be written or read. `archives`
-stores arrays with metadata (.npz), and `tables` writes typed columns.
+stores arrays with metadata (.npz), and `tables` writes typed columns. A study records the files
+that it reads, so that it can be planned again from copies.
 """
 
 from __future__ import annotations
@@ -26,7 +27,6 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from taichi_ants.errors import AntsError, expect, shown
-from taichi_ants.files import inputs
 
 if sys.version_info >= (3, 11):
     import tomllib as tomllib
@@ -34,16 +34,20 @@ else:
     import tomli as tomllib  # noqa: F401
 
 PathLike = str | os.PathLike[str]
+_record: dict[str, bytes] | None = None  # of the files that a study reads before it starts
+_copies: Mapping[str, Path] | None = None  # that are read in place of other files
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> None:
     """Write a file so that readers see either the old content or the complete new content.
 
-    Replaces an existing file and follows symbolic links. Calls `writer` with a binary file and lets
-    its exceptions pass through.
+    Replaces an existing file, follows symbolic links, and creates missing folders. Calls `writer`
+    with a binary file and lets its exceptions pass through.
     """
     with writing(path):
         target = _target_of(path)
+        if not target.parent.exists():
+            target.parent.mkdir(parents=True, exist_ok=True)
         with unfinished(target) as temporary:
             with open(temporary, "wb") as file:
                 writer(file)
@@ -66,17 +70,13 @@ def unfinished(target: Path) -> Iterator[Path]:
 
 
 def check_writable_file(path: PathLike) -> Path:
-    """Return the path, after a check that `write_atomically` can write it, before long work.
+    """Return the path of a file that `write_atomically` can write; AntsError before long work.
 
-    Creates nothing. The folder may be missing if it can be created, unless the path is a link.
-    Raises AntsError also for folders, devices and pipes.
+    Creates nothing.
     """
     with writing(path):
         target = _target_of(path)
-        folder = target.parent
-        if not os.path.islink(path):
-            folder = next(parent for parent in target.parents if parent.exists())
-        _try_to_write(folder)
+        _try_to_write(next(parent for parent in target.parents if parent.exists()))
     return Path(path)
 
 
@@ -97,11 +97,7 @@ def checksum_of_json(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, (np.generic, np.ndarray)):
-        return value.tolist()
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    raise TypeError(f"JSON cannot represent {type(value).__name__}")
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else os.fspath(value)
 
 
 def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
@@ -124,22 +120,24 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
 
 @contextmanager
 def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
-    """Yield a regular file of at most `most` bytes, open for reading.
+    """Yield a regular file of at most `most` bytes, open for reading; AntsError for others.
 
-    Raises AntsError for pipes, which could block forever, and for devices, which have no end.
+    Pipes could block forever, and devices have no end.
     """
     expect("path", path, str, os.PathLike)
     try:
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         no_wait = getattr(os, "O_NONBLOCK", 0)
-        copy = inputs.place_of(path)
+        copy = place_of(path)
         with open(copy, "rb", opener=lambda name, flags: os.open(name, flags | no_wait)) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise OSError("it is a device or a pipe")
             if status.st_size > most:
                 raise OSError(f"it has {status.st_size} bytes, and at most {most} are allowed")
-            inputs.note(path, file)
+            if _record is not None:
+                _record[os.fspath(path)] = file.read()
+                file.seek(0)
             yield file
     except AntsError:
         raise
@@ -147,6 +145,42 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
         raise AntsError(
             f"cannot read {named(path)}: {_reason(error)}; name another file."
         ) from error
+
+
+@contextmanager
+def recorded() -> Iterator[dict[str, bytes]]:
+    """Yield a mapping that gets the content of each file that this package reads, by its path."""
+    global _record
+    before, _record = _record, {}
+    try:
+        yield _record
+    finally:
+        _record = before
+
+
+@contextmanager
+def replaced(copies: Mapping[str, Path]) -> Iterator[None]:
+    """Return a context in which this package reads copies instead of the files of these paths.
+
+    Other files cannot be read while `recorded` records them.
+    """
+    global _copies
+    before, _copies = _copies, copies
+    try:
+        yield
+    finally:
+        _copies = before
+
+
+def place_of(path: PathLike) -> PathLike:
+    """Return the copy to read instead of a file, or its path; AntsError if it cannot be read."""
+    copy = (_copies or {}).get(os.fspath(path))
+    if copy is None and _copies is not None and _record is not None:
+        raise AntsError(
+            f"the study reads {named(path)}, which its archive does not contain; get another copy "
+            "of the archive."
+        )
+    return copy or path
 
 
 def read_text(path: PathLike, most: int = 1 << 26) -> str:
@@ -169,13 +203,10 @@ def small(array: np.ndarray) -> np.ndarray:
     return array.astype(np.min_scalar_type(min(low, -1 - high)))
 
 
-def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Path:
-    """Return the path of a writable folder, which is created if it is missing.
-
-    Messages name `chosen`, for example the parent folder that the user chose, instead of the path.
-    """
+def check_writable_folder(path: PathLike) -> Path:
+    """Return the path of a writable folder, which is created if it is missing."""
     folder = Path(path)
-    with writing(chosen or path):
+    with writing(path):
         folder.mkdir(parents=True, exist_ok=True)
         _try_to_write(folder)
     return folder
@@ -183,7 +214,7 @@ def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Pat
 
 @contextmanager
 def writing(path: PathLike) -> Iterator[None]:
-    """Yield once, and turn errors of the operating system into an AntsError with the path."""
+    """Return a context that turns errors of the operating system into an AntsError."""
     try:
         yield
     except AntsError:

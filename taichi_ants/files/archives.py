@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any, BinaryIO
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 import numpy as np
 import numpy.typing as npt
@@ -31,10 +31,10 @@ def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: b
     """
     content = {name: np.asarray(array) for name, array in arrays.items()}
     content[_CHECKSUM] = np.array(_checksum(content))
-    how = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
+    how = ZIP_DEFLATED if compress else ZIP_STORED
 
     def save(file: BinaryIO) -> None:
-        with zipfile.ZipFile(file, "w", how, compresslevel=_COMPRESSION) as archive:
+        with ZipFile(file, "w", how, compresslevel=_COMPRESSION) as archive:
             for name, array in content.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
                     np.lib.format.write_array(entry, array, allow_pickle=False)
@@ -42,36 +42,31 @@ def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: b
     files.write_atomically(path, save)
 
 
-def read(
-    path: files.PathLike,
-    content: bytes | None = None,
-    most: int = MOST_BYTES,
-    foreign: bool = False,
-) -> Arrays:
+def read(path: files.PathLike, content: bytes | None = None, most: int = MOST_BYTES) -> Arrays:
     """Return all arrays of an .npz file, without executing anything in it.
 
-    Args:
-        path: The file, or its name in messages if `content` is given.
-        content: The bytes of the file.
-        most: The largest number of bytes of the file, and of its unpacked arrays.
-        foreign: Whether to accept a file without a checksum, from other software.
+    With `content`, the bytes of the file, `path` is its name in messages. `most` limits the bytes
+    of the file, and of its unpacked arrays. Files of other software have no checksum.
     """
     source = files.opened(path, most) if content is None else nullcontext(io.BytesIO(content))
     name = files.named(path)
     with source as file:
         try:
-            with zipfile.ZipFile(file) as archive:
-                members = archive.infolist()
+            with np.load(file, allow_pickle=False) as archive:
+                members = archive.zip.infolist()
                 size = sum(member.file_size for member in members)
                 if size > most:
                     raise AntsError(
                         f"{name} unpacks to {size} bytes, and at most {most} are allowed; name "
                         "another file."
                     )
-                arrays = {entry.filename[:-4]: _array(archive, entry) for entry in members}
+                # Other compressions can need memory that the file does not declare.
+                if {member.compress_type for member in members} - {ZIP_STORED, ZIP_DEFLATED}:
+                    raise ValueError("it is not an archive that NumPy wrote")
+                arrays = dict(archive)  # zipfile checks their CRC-32
             written = arrays.pop(_CHECKSUM, None)
-            if not (foreign if written is None else str(written) == _checksum(arrays)):
-                raise ValueError("the checksum is missing or differs")
+            if written is not None and str(written) != _checksum(arrays):
+                raise ValueError("the checksum differs")
             return arrays
         except (AntsError, OSError, MemoryError):
             raise
@@ -80,19 +75,6 @@ def read(
                 f"{name} is damaged, or not an .npz file of this version; write it again, or name "
                 "another file."
             ) from error
-
-
-def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
-    """Return an array; reads to the end of its member, where zipfile checks the CRC-32."""
-    # Other compressions can need memory that the file does not declare.
-    is_known = member.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-    if not is_known or not member.filename.endswith(".npy"):
-        raise ValueError("it is not an array that NumPy wrote")
-    with archive.open(member) as file:
-        array = np.lib.format.read_array(file, allow_pickle=False)
-        if file.read(1):
-            raise ValueError("an array is longer than its header declares")
-    return array
 
 
 def _checksum(arrays: Arrays) -> str:
@@ -112,14 +94,13 @@ class Kind:
         name: The name of the content, for example "colony".
         version: The version of the format; reading refuses all other versions.
         writer: The function that writes such files, for messages.
-        most, foreign: See `read`.
+        most: See `read`.
     """
 
     name: str
     version: int
     writer: str
     most: int = MOST_BYTES
-    foreign: bool = False
 
     def write(
         self,
@@ -137,11 +118,9 @@ class Kind:
         self, path: files.PathLike, content: bytes | None = None
     ) -> Iterator[tuple[Arrays, dict[str, Any]]]:
         """Yield the arrays and facts of a file to a block, whose errors become an AntsError."""
-        arrays = read(path, content, self.most, self.foreign)
+        arrays = read(path, content, self.most)
         try:
-            text = arrays.pop("facts").item()
-            text = text.decode() if isinstance(text, bytes) else text
-            facts = json.loads(text)
+            facts = json.loads(arrays.pop("facts").item())
             kind, version = facts["kind"], facts["version"]
         except (AttributeError, KeyError, ValueError, TypeError, RecursionError):
             kind = version = None

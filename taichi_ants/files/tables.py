@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -40,27 +38,20 @@ def write(path: Path, table: Table, parquet: bool = False) -> None:
     None and nan are empty fields, and null in Parquet, in which mixed columns are floats if they
     have numbers only, else text.
     """
-    text = io.StringIO()
-    columns = {  # floats are written exactly
-        name: [None if value != value else value for value in values.tolist()]
-        for name, values in table.items()
-    }
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(columns)
-    rows.writerows(zip(*columns.values(), strict=True))
-    files.write_text(path.with_suffix(".csv"), text.getvalue())
+    columns = {name: values.tolist() for name, values in table.items()}
+    rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+    files.write_csv(path.with_suffix(".csv"), rows, [*columns])
     if parquet:
         pyarrow = imported("Parquet", "pyarrow", "parquet")
-        arrays = {
-            name: pyarrow.array(*_typed(values, table[name])) for name, values in columns.items()
-        }
+        arrays = {name: pyarrow.array(*_typed(values)) for name, values in columns.items()}
         whole, to_file = pyarrow.table(arrays), imported("", "pyarrow.parquet", "").write_table
         files.write_atomically(path.with_suffix(".parquet"), lambda file: to_file(whole, file))
 
 
-def _typed(values: list[Any], column: np.ndarray) -> tuple[list[Any], str]:
+def _typed(values: list[Any]) -> tuple[list[Any], str]:
     """Return values as Parquet has them, and the name of their type."""
-    kinds = {type(value) for value in column.tolist()} - {type(None)}
+    kinds = {*map(type, values)} - {type(None)}
+    values = [None if value != value else value for value in values]
     if kinds == {bool}:
         return values, "bool_"
     if kinds and kinds <= {int, float} and all(v is None or abs(v) < 2**63 for v in values):

@@ -113,10 +113,8 @@ class AxialGrid:
         x, y, z = self.ranges
         q, r = self.axes()
         # In normal form x = max(0, q, q - r), y = max(0, r, r - q), z = max(0, -q, -r).
-        inside = np.empty((self.height, self.width), dtype=bool)
         difference = q - r
-        np.less(difference, x, out=inside)
-        inside &= difference > -y
+        inside = (difference < x) & (difference > -y)
         inside &= (q > -z) & (q < x)
         inside &= (r > -z) & (r < y)
         inside.setflags(write=False)

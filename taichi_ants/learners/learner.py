@@ -68,7 +68,7 @@ class Learner:
             if function is not None:
                 if not callable(function):
                     raise AntsError(
-                        f"{part} of {self.name!r} is {shown(function)}; it must be a function."
+                        f"{part} of {shown(self.name)} is {shown(function)}; it must be a function."
                     )
                 object.__setattr__(self, part, kernel_function(function))
 

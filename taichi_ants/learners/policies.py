@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from taichi_ants.errors import AntsError, as_array, check_one_of, expect, shown
-from taichi_ants.files import PathLike, to_json
+from taichi_ants.files import PathLike
 from taichi_ants.files.archives import Kind
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Choice, Task, observations
@@ -24,7 +24,7 @@ from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, 
 from taichi_ants.task.states import TASK_NAMES
 
 ActionValues = npt.NDArray[np.float32]
-_KIND = Kind("policy", 2, "save_policy", most=1 << 26, foreign=True)
+_KIND = Kind("policy", 2, "save_policy", most=1 << 26)
 
 
 class Policy(NamedTuple):
@@ -177,7 +177,6 @@ def save_policy(
     """
     table = checked_table(q_values, Task(observations.get(observation).name))
     expect("metadata", metadata, Mapping)
-    to_json(metadata)  # raises TypeError
     _KIND.write(path, {"observation": observation, "metadata": metadata}, {"q_values": table})
 
 

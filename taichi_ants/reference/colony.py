@@ -13,22 +13,14 @@ from taichi_ants.features.support import COLONY, refuse_unsupported
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_BORN, STREAM_QUEEN
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import frozen_policy
-from taichi_ants.reference.actions import Intent, carry_out, intend
+from taichi_ants.reference.actions import Intent, carry_out, intend, pay
 from taichi_ants.reference.ants import Ant, Transition, nest_of, starts
-from taichi_ants.reference.choice import choose_action, choose_cell
-from taichi_ants.reference.features import hooks
-from taichi_ants.reference.features.castes import (
-    caste_of,
-    castes_at_start,
-    draw_caste,
-    draw_trait,
-    epsilon_of,
-)
+from taichi_ants.reference.choice import choose_action, choose_by_rule, choose_cell
+from taichi_ants.reference.features import castes, hooks
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS, learn_together
-from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, codes_in_view, observe
-from taichi_ants.reference.own_rules import choose_by_rule, pay, view_of
+from taichi_ants.reference.observations import OBSERVATIONS, codes_in_view, observe, yours
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task
@@ -79,12 +71,8 @@ class ReferenceColony:
         refuse_unsupported("the reference", task.uses(), COLONY)
         if training is None:  # ants choose without action values
             training = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
-        if task.observation in OBSERVATIONS:
-            self._row = OBSERVATIONS[task.observation]
-            self._turns = TURNS.get(task.observation, AHEAD)
-        else:
-            self._row = lambda world, ant: int(task.sees.encode(view_of(world, ant, task.sees)))
-            self._turns = task.sees.cells
+        self._row = OBSERVATIONS.get(task.observation) or partial(yours, task.sees)
+        self._turns = task.sees.cells  # in the order in which ants may misread them
         self.start_world, self.training = world, training
         self._ends_at_delivery = ends_at_delivery
         self.n_ants = ants  # at the start of an episode
@@ -95,13 +83,12 @@ class ReferenceColony:
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         self._make = partial(LEARNERS[training.learner], training, task.n_states)
-        castes = self.castes or [Caste()]
-        n = self.slots if sharing == "independent" else len(queens_of(world)) * len(castes)
+        n = self.slots if sharing == "independent" else len(queens_of(world)) * len(self.castes)
         tables = [q_values] * n
         if q_values is not None and q_values.ndim > 2:
             tables = list(q_values.reshape(n, *q_values.shape[-2:]))
         for number in range(n if sharing != "independent" else 0):
-            if (policy := castes[number % len(castes)].policy) is not None:
+            if (policy := self.castes[number % len(self.castes)].policy) is not None:
                 tables[number] = frozen_policy(policy, task.observation)
         # One for each slot if they are independent, else for each nest and caste.
         self.learners = [self._make(table) for table in tables]
@@ -112,14 +99,14 @@ class ReferenceColony:
 
     @property
     def castes(self) -> list[Caste]:
-        """The castes of the task, if any."""
-        return list(self.task.castes.values())
+        """The castes of the task, or one without settings."""
+        return list(self.task.castes.values()) or [Caste()]
 
     def table_of(self, ant: Ant | Transition) -> int:
         """Return the number of the table of an ant."""
         if self.sharing == "independent":
             return ant.slot
-        return ant.nest * max(1, len(self.castes)) + ant.caste
+        return ant.nest * len(self.castes) + ant.caste
 
     def _set_up(self) -> None:
         """Reset everything that lasts for one episode."""
@@ -135,7 +122,7 @@ class ReferenceColony:
         nests = [nest_of(self.start_world, number) for number in range(self.n_ants)]
         self.starting = Counter(nests)  # ants at the start by nest
         left = [
-            castes_at_start(self.castes or [Caste()], nest, self.starting[nest])
+            castes.castes_at_start(self.castes, nest, self.starting[nest])
             for nest in range(len(self.world.queens))
         ]
         for number, (cell, heading) in enumerate(begin):
@@ -147,7 +134,7 @@ class ReferenceColony:
 
     def add(self, ant: Ant) -> None:
         """Put an ant into its slot and onto its cell."""
-        ant.trait = draw_trait(self.seed, ant.number)
+        ant.trait = castes.draw_trait(self.seed, ant.number)
         for born in hooks(self.task, "born"):
             born(self, ant)
         self.ants[ant.slot] = ant
@@ -257,14 +244,14 @@ class ReferenceColony:
         return any(results)
 
     def _draw_action(self, ant: Ant, tick: int) -> int:
-        caste, choice = caste_of(self.task, ant), self.task.choice
+        caste, choice = self.castes[ant.caste], self.task.choice
         for name in ("temperature", "k", "exponent"):
             if (number := getattr(caste, name)) is not None:
                 choice = replace(choice, **{name: number})
         if choice.rule == "deneubourg":
             return choose_cell(self.world, ant, choice, self.task.traffic)
         values = self.learners[self.table_of(ant)].rows[ant.state] if choice.needs_table else []
-        epsilon = epsilon_of(caste, ant, self.epsilon)
+        epsilon = castes.epsilon_of(caste, ant, self.epsilon)
         if choice.own_rule is not None:
             return choose_by_rule(self.world, ant, self.task, values, epsilon, tick)
         return choose_action(values, epsilon, ant.stream, choice)
@@ -304,7 +291,7 @@ class ReferenceColony:
             if slot is None or not free:
                 return
             heading = free[pick(self.queen_stream.draw()[0], len(free))]
-            caste = draw_caste(self.castes, nest, self.starting[nest], self.queen_stream)
+            caste = castes.draw_caste(self.castes, nest, self.starting[nest], self.queen_stream)
             self.new_ant(around[heading], heading, slot, nest, caste)
             self.stores[nest] -= 1
             self.record.births += 1
@@ -343,7 +330,7 @@ class ReferenceColony:
         same = ("slot", "number", "action", "executed", "reward", "event", "nest", "caste")
         for was, ant in pairs:
             terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
-            number, follows = self.table_of(ant), caste_of(self.task, ant).policy is not None
+            number, follows = self.table_of(ant), self.castes[ant.caste].policy is not None
             learns = self.learns and not (follows and self.sharing == "shared")
             # After a delivery that terminates, the ant chooses at the start of its next tick.
             if learns and self.learners[number].draws_next_action and not terminated:
@@ -363,7 +350,7 @@ class ReferenceColony:
             if learns:
                 members[number].append((ant, step))
         for number, of_table in members.items():
-            learner, caste = self.learners[number], caste_of(self.task, of_table[0][0])
+            learner, caste = self.learners[number], self.castes[of_table[0][0].caste]
             rate, discount = caste.learning_rate, caste.discount
             learner.learning_rate = np.float32(self.learning_rate if rate is None else rate)
             learner.discount = np.float32(self.training.discount if discount is None else discount)

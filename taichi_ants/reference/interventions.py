@@ -10,15 +10,9 @@ import taichi_ants.interventions as language
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_INTERVENTION
 from taichi_ants.protocol import At, Every, ProtocolEvent, When
 from taichi_ants.reference.ants import Ant, start_order
-from taichi_ants.reference.colony import EpisodeRecord, ReferenceColony
+from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.features.castes import draw_caste
-from taichi_ants.reference.geometry import (
-    Cell,
-    distance,
-    existing_cells,
-    listed_cells,
-    normal_form,
-)
+from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells, normal_form
 from taichi_ants.reference.measures import measured
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
@@ -206,16 +200,6 @@ class Protocol:
 
     def __init__(self, colony: ReferenceColony, events: Sequence[ProtocolEvent]) -> None:
         self._colony, self._events = colony, events
-
-    def run(self, episodes: int, ticks: int) -> list[EpisodeRecord]:
-        """Return the records of whole episodes."""
-        for _ in range(episodes):
-            self.begin_episode()
-            while self._colony.record.ticks < ticks and not self._colony.over:
-                self.before_tick()
-                self._colony.tick(last=self._colony.record.ticks == ticks - 1)
-            self.end_episode()
-        return self._colony.records[-episodes:]
 
     def begin_episode(self) -> None:
         """Begin an episode of the colony."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable
+from functools import partial
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
@@ -31,20 +32,17 @@ def path_ratio(colony: ReferenceColony) -> float:
     """Return the path length divided by the fewest ticks for the nearest food of the start."""
     world = colony.start_world
     walls, foods = set(listed_cells(world.obstacles)), set(listed_cells(world.foods))
-    inside, fewest = set(colony.world.ground), NONE
     steps: dict[Cell, int] = {world.queen: 0}
-    waiting = deque([world.queen])
-    while waiting:
-        cell = waiting.popleft()
+    waiting = [world.queen]
+    for cell in waiting:  # the list grows during this loop
         if cell in foods:
-            fewest = max(1, steps[cell] - 1)
-            break
+            return path_length(colony) / max(1, steps[cell] - 1)
         for heading in range(N_HEADINGS):
             there = neighbour(cell, heading)
-            if there in inside and there not in walls and there not in steps:
+            if there in colony.world.ground and there not in walls and there not in steps:
                 steps[there] = steps[cell] + 1
                 waiting.append(there)
-    return path_length(colony) / fewest
+    return NONE
 
 
 def entropy(colony: ReferenceColony) -> float:
@@ -60,16 +58,9 @@ def entropy(colony: ReferenceColony) -> float:
     return max(0.0, -math.fsum(terms) / math.log(len(cells)))
 
 
-def mean_of_ants(
-    value: Callable[[ReferenceColony, Ant], float],
-) -> Callable[[ReferenceColony], float]:
-    """Return a function that returns the mean of a value of the living ants."""
-
-    def mean(colony: ReferenceColony) -> float:
-        values = [value(colony, ant) for ant in colony.ants.values()]
-        return sum(values) / len(values) if values else NONE
-
-    return mean
+def mean(colony: ReferenceColony, value: Callable[[Ant], float]) -> float:
+    """Return the mean of a value of the living ants."""
+    return ratio(sum(value(ant) for ant in colony.ants.values()), len(colony.ants))
 
 
 def measured(colony: ReferenceColony, name: str) -> float:
@@ -83,7 +74,7 @@ def measured(colony: ReferenceColony, name: str) -> float:
         return sum(n for key, n in of_pairs if key[column] == int(number))
     if before == "regions":
         cells = listed_cells(colony.start_world.regions[part])
-        return mean_of_ants(lambda _, ant: ant.cell in cells)(colony)
+        return mean(colony, lambda ant: ant.cell in cells)
     return MEASURES[name](colony)
 
 
@@ -100,14 +91,16 @@ MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
     "entropy.trail": entropy,
     "waiting_births": lambda colony: sum(colony.stores),
     "blocked_share": lambda colony: ratio(colony.record.blocked, colony.record.moves),
-    "activity": mean_of_ants(lambda _, ant: ant.event in (Event.ENTERED_EMPTY, Event.ENTERED_CUE)),
+    "activity": lambda colony: mean(
+        colony, lambda ant: ant.event in (Event.ENTERED_EMPTY, Event.ENTERED_CUE)
+    ),
     "living": lambda colony: len(colony.ants),
-    "carriers": mean_of_ants(lambda _, ant: ant.carries),
-    "distance": mean_of_ants(
-        lambda colony, ant: min(distance(ant.cell, queen) for queen in colony.world.queens)
+    "carriers": lambda colony: mean(colony, lambda ant: ant.carries),
+    "distance": lambda colony: mean(
+        colony, lambda ant: min(distance(ant.cell, queen) for queen in colony.world.queens)
     ),
     **{
-        name: mean_of_ants(of_ant)
+        name: lambda colony, of_ant=of_ant: mean(colony, partial(of_ant, colony))  # type: ignore[misc]
         for twin in TWINS.values()
         for name, of_ant in getattr(twin, "MEASURES", {}).items()
     },

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Sequence
 from functools import partial
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
 
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, distance, neighbour
 from taichi_ants.reference.world_state import Level, Trail, WorldState
+from taichi_ants.rules.inputs import Vector
+from taichi_ants.task import Observation, Traffic
 from taichi_ants.task.constants import EMPTY, FOOD, SEES_CUE, SEES_EMPTY, SEES_GOAL, SEES_OBSTACLE
 
 AHEAD = (-1, 0, 1)  # headings relative to the ant's: left, forward, right
@@ -119,6 +125,24 @@ def ants_seen(world: WorldState, ant: Ant) -> int:
     return _number([ant.carries, *codes], 5)
 
 
+def ways(
+    world: WorldState, ant: Ant, codes: Sequence[int], traffic: Traffic
+) -> tuple[list[bool], list[bool]]:
+    """Return which cells ahead an ant can enter, and which are nearer to its queen.
+
+    Only an ant with a compass knows the latter. `codes` are those of the cells as it sees them.
+    """
+    has_compass = world.has_compass(ant)
+    is_open = [code in (SEES_EMPTY, SEES_CUE) for code in codes]
+    nearer = [code == SEES_CUE and has_compass for code in codes]
+    for side, cell in enumerate(cells_in_view(ant)):
+        if cell in world.ants and side - 1 not in ant.misread:
+            nearer[side] = has_compass and is_better(world, ant, cell)
+            if traffic.shared and nestmate(world, ant, cell):
+                is_open[side] = ant.carries or traffic.follow
+    return is_open, nearer
+
+
 def trail_levels(world: WorldState, ant: Ant) -> int:
     """Return the state index of load and cells ahead; trails have three codes, by strength."""
     strongest = strongest_in_view(world, ant)
@@ -171,6 +195,48 @@ def _number(digits: list[int], base: int) -> int:
     return value
 
 
+def yours(observation: Observation, world: WorldState, ant: Ant) -> int:
+    """Return the state index of your own observation, from the view of the ant.
+
+    A misread cell has no ant, no level, and is not nearer.
+    """
+    turns, cells = observation.cells, cells_in_view(ant, observation.cells)
+    seen = [turn not in ant.misread for turn in turns]
+    others = [world.ants.get(cell) if s else None for cell, s in zip(cells, seen, strict=True)]
+    cue, queen = world.cue(ant), world.queens[ant.nest]
+    # All levels of cues are float32 if those of one cue are.
+    cues = {name for pair in world.cues for name in pair if name != "compass"}
+    dense = any(world.pheromones[name].rule.dense for name in cues)
+
+    def levels(trail: Trail, dense: bool) -> tuple[Vector, Any]:
+        """Return the levels of the cells, and that of the ant's cell."""
+        kind: type = np.float32 if dense else np.int32
+        in_view = levels_in_view(world, ant, trail, turns, ant.misread)
+        return Vector(map(kind, in_view)), kind(trail.level(ant.cell))
+
+    ahead, own_level = levels(cue, dense)
+    if world.cues[ant.caste][1] == "compass":
+        far = distance(ant.cell, queen)
+        nearer = [distance(cell, queen) < far for cell in cells]
+    else:
+        nearer = [bool(level > own_level) for level in ahead]
+    view: dict[str, Any] = {
+        "carries": int(ant.carries),
+        "paper_state": more_cells(AHEAD, world, ant),
+        "codes": Vector(codes_seen(world, ant, turns)),
+        "levels": ahead,
+        "ants": Vector(1 + o.carries if o and o.nest == ant.nest else 0 for o in others),
+        "other_nest_ants": Vector(int(o is not None and o.nest != ant.nest) for o in others),
+        "nearer": Vector(int(near and s) for near, s in zip(nearer, seen, strict=True)),
+        "strongest": type(own_level)(strongest_in_view(world, ant)),
+        "own_level": own_level,
+    }
+    for name in observation.reads:
+        trail = world.pheromones[name]
+        view[name], view[f"own_{name}"] = levels(trail, trail.rule.dense)
+    return int(observation.encode(SimpleNamespace(**view)))
+
+
 OBSERVATIONS: dict[str, Callable[[WorldState, Ant], int]] = {
     "paper": partial(more_cells, AHEAD),
     "five_cells": partial(more_cells, FIVE),
@@ -180,5 +246,3 @@ OBSERVATIONS: dict[str, Callable[[WorldState, Ant], int]] = {
     "ants": partial(crowd, False),
     "queues": partial(crowd, True),
 }
-# The cells in view, in the order in which ants may misread them.
-TURNS = {**dict.fromkeys(OBSERVATIONS, AHEAD), "five_cells": FIVE, "six_cells": SIX}

@@ -10,7 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 
-PAGE = 0xFFFFFF  # also the area outside the world, and the lines between cells
+PAGE = 0xFFFFFF  # also the area outside the world, and the lines between cells; channels are equal
 CELL_EMPTY = 0xEAEEF4
 CELL_OBSTACLE = 0x464B52
 CELL_FOOD = 0xD55E00

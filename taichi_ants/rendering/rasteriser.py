@@ -157,7 +157,6 @@ class Rasteriser:
     ) -> None:
         self.grid, self._strongest = grid, strongest or {}
         self.width, self.height = width, height
-        self._page = np.full((height, width, 3), colours.channels(colours.PAGE))
         x_range, y_range, z_range = grid.ranges
         # The lowest and the highest (x, y), relative to cell (0, 0, 0) in hexagon sizes. In
         # `hexgrid.centre_of`, x increases with y and decreases with z; y decreases with x.
@@ -209,7 +208,7 @@ class Rasteriser:
     def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
         """Return a picture of cells in these colours, uint32 (grid.size,)."""
         grid, hexagon = self.grid, self.hexagon
-        frame = self._page.copy()
+        frame = np.full((self.height, self.width, 3), colours.PAGE & 255, np.uint8)
         if hexagon < _DOTS_BELOW:
             layout = (*self._origin.tolist(), hexagon, grid.width, grid.height, grid.ranges[2])
             _launch("draw_small_cells", frame, of_cells, *layout)

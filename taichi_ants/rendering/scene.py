@@ -19,7 +19,7 @@ from taichi_ants.task.constants import ACTION_NAMES, FOOD, N_ACTIONS, QUEEN
 from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.states import TASK_NAMES
 
-PAPER = observations.get("paper")
+_PAPER = observations.get("paper")
 SMALLEST_SIDE, LARGEST_SIDE = 64, 4096
 DEFAULT_SIZE = (1280, 720)
 # In multiples of the text size.
@@ -75,7 +75,7 @@ class Status:
     q_values: np.ndarray | None = None  # float (5,), of the state; None draws no bars
     action: int | None = None  # the chosen action, 0 to 4
     q_range: tuple[float, float] = (0.0, 1.0)  # the scale of the bars, from at most 0 to above 0
-    observation: Observation = PAPER  # the observation that encodes the state
+    observation: Observation = _PAPER  # the observation that encodes the state
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -155,7 +155,7 @@ class Scene:
             return world
         left, width, size = self._panel
         shape = self._height, left + width + self._margin, 3
-        frame = np.full(shape, colours.PAGE & 255, np.uint8)  # white, so that channels are equal
+        frame = np.full(shape, colours.PAGE & 255, np.uint8)
         frame[:, : world.shape[1]] = world
         text.write(frame, self._title, left, self._margin + size, size, room=width)
         if status is not None:

@@ -12,14 +12,13 @@ without raising its `VERSION` has that number; otherwise its text is a part of t
 
 from __future__ import annotations
 
-import itertools
 import json
-import re
+import os
 import sys
 import time
 from argparse import Namespace
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -27,23 +26,19 @@ from typing import Any
 
 from taichi_ants import PHYSICS, __version__, files
 from taichi_ants.errors import AntsError, imported
-from taichi_ants.files.inputs import recorded, replaced
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies import folder
 from taichi_ants.studies.command_line import notice, progress_bar
 from taichi_ants.studies.executors import Workers
-from taichi_ants.studies.folder import INPUTS, MANIFEST, PAGE, REPORT, Results
+from taichi_ants.studies.folder import INPUTS, MANIFEST, PAGE, REPORT, Results, provenance
 from taichi_ants.studies.plugins import Code, checksum_of, load_plugin, placed, read_plugin
 from taichi_ants.studies.points import settings_of
-from taichi_ants.studies.provenance import provenance
 from taichi_ants.studies.store import DamagedError, Store
 from taichi_ants.studies.study import Study, run
 
 # Options of all studies, which `plan` does not get.
-_OF_ALL = (
-    *("out", "force", "no_figures", "parquet", "plugin"),
-    *("arch", "threads", "workers", "ray", "shard"),
-)
+_OF_ALL = {"out", "force", "no_figures", "parquet", "plugin"}
+_OF_ALL |= {"arch", "threads", "workers", "ray", "shard"}
 
 
 @dataclass(frozen=True)
@@ -55,7 +50,7 @@ class Planned:
         plan: The object that the module's `plan` has returned.
         code: The plugin and the file of the module, as far as there are any.
         inputs: The contents of all files that the study has read, by their paths in a folder.
-        facts: Facts from which `opened` plans the same study again.
+        asked: What the study asks for, as JSON has it, in folders of results.
     """
 
     module: Any
@@ -63,30 +58,19 @@ class Planned:
     study: Study
     code: list[Code]
     inputs: Mapping[str, bytes]
-    facts: Mapping[str, Any]
-
-    def asked(self) -> dict[str, Any]:
-        """Return what the study asks for, as JSON in folders of results."""
-        study = self.study
-        asked = {
-            **{"version": __version__, "physics": PHYSICS, **self.facts},
-            **{"points": study.keys, "seeds": study.seeds, "arrays": study.arrays},
-            **{"seconds": study.seconds[:, 0], "families": study.families},
-        }
-        return json.loads(files.to_json(asked))
+    asked: Mapping[str, Any]
 
 
 def planned(module: str, settings: Namespace) -> Planned:
     """Return the study of a module, a name or the path of a file, for the settings of a command.
 
-    Raises:
-        AntsError: A file cannot be read or run, or an option is not allowed.
+    Raises an AntsError if a file cannot be read or run, or an option is not allowed.
     """
     options = {name: value for name, value in vars(settings).items() if name not in _OF_ALL}
     options = json.loads(files.to_json(options))
     plugin, arch, file = settings.plugin, settings.arch, module if module[-3:] == ".py" else None
     codes = {"plugin": read_plugin(plugin), "study": read_plugin(file)}
-    with recorded() as read:
+    with files.recorded() as read:
         load_plugin(plugin, codes["plugin"])
         loaded: Any = load_plugin(file, codes["study"]) or import_module(module)
         plan = loaded.plan(options)
@@ -106,22 +90,25 @@ def planned(module: str, settings: Namespace) -> Planned:
     }
     copies = dict[str, str]()
     for path, content in read.items():
-        base = re.sub(r"[^\w.-]", "_", Path(path).name)
-        names = (f"{INPUTS}/{f'{n}-' if n > 1 else ''}{base}" for n in itertools.count(1))
-        copies[path] = next(name for name in names if name not in inputs)
+        copy = Path(INPUTS, Path(path).name)
+        while copy.as_posix() in inputs:
+            copy = copy.with_name(f"2-{copy.name}")
+        copies[path] = copy.as_posix()
         inputs[copies[path]] = content
-    facts = {"module": module, "options": options, "plugin": plugin, "arch": arch, "inputs": copies}
-    facts["settings"] = settings_of(study.points, study.seeds) | getattr(plan, "facts", dict)()
-    return Planned(loaded, plan, study, [*filter(None, codes.values())], inputs, facts)
+    asked = {
+        **{"version": __version__, "physics": PHYSICS, "module": module, "options": options},
+        **{"plugin": plugin, "arch": arch, "inputs": copies},
+        "settings": settings_of(study.points, study.seeds) | getattr(plan, "facts", dict)(),
+        **{"points": study.keys, "seeds": study.seeds, "arrays": study.arrays},
+        **{"seconds": study.seconds[:, 0], "families": study.families},
+    }
+    asked = json.loads(files.to_json(asked))
+    return Planned(loaded, plan, study, [*filter(None, codes.values())], inputs, asked)
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[Planned]:
-    """Yield the study of a folder of results, planned from the files in the folder.
-
-    Raises:
-        AntsError: The folder has no study, or its study cannot be planned.
-    """
+    """Yield the study of a folder of results, planned from its files; AntsError if it has none."""
     asked = folder.asked_in(path)
     plugin, module = asked["plugin"], asked["module"]
     if plugin:
@@ -129,7 +116,7 @@ def opened(path: Path) -> Iterator[Planned]:
     if module.endswith(".py"):
         module = str(path / INPUTS / "study" / Path(module).name)
     settings = Namespace(**asked["options"], plugin=plugin, arch=asked["arch"])
-    with replaced({name: path / copy for name, copy in asked["inputs"].items()}):
+    with files.replaced({name: path / copy for name, copy in asked["inputs"].items()}):
         again = planned(module, settings)
         if list(again.study.keys) != asked["points"]:
             raise AntsError(
@@ -137,7 +124,7 @@ def opened(path: Path) -> Iterator[Planned]:
                 f"version {asked['version']}, physics {asked['physics']}; use that version, or run "
                 "the command of the folder again."
             )
-        yield replace(again, facts={name: asked[name] for name in again.facts})
+        yield replace(again, asked={**asked, "version": __version__})
 
 
 def run_study(settings: Namespace, planned: Planned, report: bool = True) -> bool:
@@ -154,26 +141,31 @@ def run_study(settings: Namespace, planned: Planned, report: bool = True) -> boo
     figures, parquet = not settings.no_figures, getattr(settings, "parquet", False)
     if parquet:
         imported("Parquet", "pyarrow", "parquet")
-    asked, study = planned.asked(), planned.study
-    is_shown = not settings.force and folder.is_finished(out, asked, figures, parquet)
+    asked, study = planned.asked, planned.study
+    before = folder.json_in(out / MANIFEST) or {}
+    is_shown = (
+        not settings.force
+        and folder.is_finished(out, asked, before)
+        and (before["figures"] or not figures)
+        and (before["parquet"] or not parquet)
+    )
     if not is_shown:
         folder.ask(out, asked, planned.inputs, settings.force)
-        manifest = folder.json_in(out / MANIFEST) or {}
-        figures |= manifest.get("figures", False)
-        parquet |= manifest.get("parquet", False)
+        figures |= before.get("figures", False)
+        parquet |= before.get("parquet", False)
     is_finished = is_shown
     while not is_finished:
         store = Store(out)
         for path in store.damaged:
             notice(f"{files.named(path)} is damaged, so its runs are computed again.")
         if study.missing(store).any():
-            title = Path(planned.facts["module"].rpartition(".")[2]).stem
+            title = planned.module.__name__.rpartition(".")[2].removeprefix("plugin_")
             with (
                 folder.session(out, shard),
                 executor_of(settings) as (executor, threads),
                 progress_bar(title) as progress,
             ):
-                how: dict[str, Any] = {"threads": threads, "arch": planned.facts["arch"]}
+                how: dict[str, Any] = {"threads": threads, "arch": asked["arch"]}
                 run(study, store, executor, shard, progress, planned.code, **how)
             store.refresh()
         if study.missing(store).any():
@@ -201,20 +193,33 @@ def run_study(settings: Namespace, planned: Planned, report: bool = True) -> boo
 def write_tables(
     out: Path, planned: Planned, store: Store, figures: bool, parquet: bool, part: bool = False
 ) -> None:
-    """Write the tables of a study; with `part`, runs can be missing, and results are unfinished.
+    """Write the tables of a study; DamagedError if a block cannot be read.
 
-    Raises:
-        DamagedError: A block cannot be read; its runs are missing now.
+    With `part`, runs can be missing, and the results are unfinished.
     """
     seconds = sum(session["seconds"] or 0.0 for session in folder.sessions_in(out))
     made = provenance(sys.argv) | {"seconds": seconds}
     with files.writing(out), files.unfinished(out / "tables") as ready:
         ready.mkdir()
-        arch = planned.facts["arch"]
-        results = Results(planned.study, ready, store, made, figures, parquet, part, arch)
+        how = figures, parquet, part, planned.asked["arch"]
+        results = Results(planned.study, ready, store, made, *how)
         files.write_text(ready / REPORT, planned.module.tables(planned.plan, results))
-        made |= {"figures": any(ready.rglob("*.png")), "parquet": parquet}
-        folder.publish(out, ready, None if part else made)
+        paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
+        checksums = {path.as_posix(): folder.checksum_of(ready / path) for path in paths}
+        with suppress(AntsError):  # a damaged manifest is replaced
+            for name in (folder.json_in(out / MANIFEST) or {"files": ()})["files"]:
+                is_inside = (out / name).resolve().is_relative_to(out.resolve())
+                if name not in checksums and is_inside:
+                    (out / name).unlink(missing_ok=True)
+        for path in paths:
+            (out / path).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(ready / path, out / path)
+        if part:
+            (out / MANIFEST).unlink(missing_ok=True)
+        else:
+            made |= {"figures": any(path.suffix == ".png" for path in paths), "parquet": parquet}
+            made |= {"study": files.checksum_of_json(folder.asked_in(out)), "files": checksums}
+            folder.write_json(out / MANIFEST, made)
 
 
 @contextmanager

@@ -23,8 +23,7 @@ EXIT_BAD_INPUT = 2
 PLUGIN = "Python file that registers learners, observations, worlds, measures or rules"
 # Names of worlds, because an import of their registry would import NumPy.
 WORLDS = (
-    "paper, open, far_piles, double_bridge, or the path of a map file; --world.SETTING changes a "
-    "setting of the world"
+    "paper, open, far_piles, double_bridge, or the path of a map file; --world.SETTING: a setting"
 )
 AGAIN = "Stopped; finished parts are saved. Run the same command again to resume."
 
@@ -97,8 +96,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--plugin", metavar="FILE", help=PLUGIN)
     add_threads(parser)
-    arch = "processor of the simulation: cpu, or cuda for an NVIDIA GPU (runs of lone ants only, "
-    arch += "with other last bits)"
+    arch = "processor: cpu, or cuda for an NVIDIA GPU (lone ants only, with other last bits)"
     add("--arch", choices=("cpu", "cuda"), default="cpu", help=arch)
 
 
@@ -129,15 +127,9 @@ def add_machines(parser: argparse.ArgumentParser) -> None:
     add = parser.add_mutually_exclusive_group().add_argument
     workers = "number of worker processes on this machine (default: all work in this process)"
     add("--workers", type=whole_number(1, 1024), metavar="N", help=workers)
-    ray = (
-        "spread the work with Ray over this machine, or over the cluster at HOST:PORT that this "
-        "machine belongs to"
-    )
+    ray = "spread the work with Ray over this machine, or over its cluster at HOST:PORT"
     add("--ray", nargs="?", const=True, metavar="HOST:PORT", help=ray)
-    shard = (
-        "compute only the I-th of N equal parts, for example of a job array; the last part to "
-        "finish in a folder writes the tables"
-    )
+    shard = "compute the I-th of N equal parts; the last to finish in a folder writes the tables"
     parser.add_argument("--shard", type=_shard, metavar="I/N", help=shard)
 
 

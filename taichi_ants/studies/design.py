@@ -20,15 +20,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from taichi_ants.analysis.statistics import RANDOM_SEED, all_equal, known_means
-from taichi_ants.analysis.sweeps import short
-from taichi_ants.analysis.tables import Table, interval, number, percent, plain_text
+from taichi_ants.analysis.tables import Table, number, plain_text
 from taichi_ants.errors import AntsError, imported, shown
 from taichi_ants.settings import Flag, Setting, Settings
 
 _DRAWN = ("design", "sobol")  # the condition of the other keys
-# Of the table of indices. The share of the seeds is that of the measure.
 COLUMNS = ("measure", "setting", "first_order", "first_order_low", "first_order_high",
-    "total", "total_low", "total_high", "seed_share")  # fmt: skip
+    "total", "total_low", "total_high")  # of the table of indices  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -142,8 +140,7 @@ class Design(Settings):
     def shares(self, dimensions: int) -> np.ndarray:
         """Return points of the unit cube, float64 (points, dimensions), for other than grids.
 
-        Raises:
-            AntsError: `sensitivity` needs SALib, which is not installed.
+        Raises AntsError if `sensitivity` needs SALib, which is not installed.
         """
         n: Any = self.samples
         if self.sensitivity:
@@ -175,44 +172,18 @@ def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[dict
     if np.isnan(means).any() or all_equal(means[None])[0]:
         return []
     how = {"calc_second_order": False, "num_resamples": 1000, "seed": RANDOM_SEED}
-    found, share, rows = sobol.analyze(_problem(names), means, **how), seed_share(values, names), []
+    found, rows = sobol.analyze(_problem(names), means, **how), []
     for n, name in enumerate(names):
         ends = []
         for index in ("S1", "ST"):
             value, half = float(found[index][n]), float(found[f"{index}_conf"][n])
             ends += [value, value - half, value + half]
-        rows.append(dict(zip(COLUMNS, (measure, name, *ends, share), strict=True)))
+        rows.append(dict(zip(COLUMNS, (measure, name, *ends), strict=True)))
     return rows
 
 
-def seed_share(values: np.ndarray, names: Sequence[str]) -> float:
-    """Return the share of the variance of means over seeds that the seeds make, 0 to 1.
-
-    The change that seeds still make looks like an interaction of all settings. The share is
-    estimated from the points that are drawn independently, the first and the last of each group.
-    What a seed adds to all points alike does not count, because all points have the same seeds.
-    Points at which a seed has no value do not count. Nan for one seed.
-    """
-    step, seeds = len(names) + 2, values.shape[1]
-    drawn = np.concatenate([values[::step], values[step - 1 :: step]])
-    drawn = drawn[~np.isnan(drawn).any(axis=1)]
-    if seeds < 2 or len(drawn) < 2:
-        return float("nan")
-    rest = drawn - drawn.mean(axis=1, keepdims=True) - drawn.mean(axis=0) + drawn.mean()
-    noise = np.square(rest).sum() / ((len(drawn) - 1) * (seeds - 1)) / seeds
-    variance = drawn.mean(axis=1).var(ddof=1)
-    return min(1.0, float(noise / variance)) if variance > 0 else float("nan")
-
-
 def report(rows: Sequence[Mapping[str, Any]], seeds: int) -> str:
-    """Return rows of indices as a table for a terminal, the largest total index first."""
-    measures, names = ([*dict.fromkeys(row[k] for row in rows)] for k in COLUMNS[:2])
-    lines = []
-    for row in sorted(rows, key=lambda row: (measures.index(row["measure"]), -row["total"])):
-        measure, name, *numbers, share = row.values()
-        groups = numbers[:3], numbers[3:]
-        cells = [f"{number(n, 2)} {interval(low, high, 2)}" for n, low, high in groups]
-        lines.append([measure, short(name, names), *cells, percent(share)])
-    headers = ["measure", "setting", "first order", "total", "share of seeds"]
-    notes = [f"Indices of means over {seeds} seeds, whose share is in each total index."]
-    return plain_text([Table("", headers, lines, notes, text_columns=2)], 120)
+    """Return rows of indices as a table for a terminal."""
+    lines = [[n if isinstance(n, str) else number(n, 2) for n in row.values()] for row in rows]
+    notes = [f"Indices of means over {seeds} seeds, whose remaining change is in each total."]
+    return plain_text([Table("", COLUMNS, lines, notes, text_columns=2)], 200)

@@ -33,7 +33,6 @@ _LOOK_EVERY = 0.5  # seconds between looks for Ctrl-C
 RESUME = "finished parts are saved, so run the same command again to resume"  # ends messages
 
 Piece = TypeVar("Piece", bound=Hashable)
-Versions = tuple[str, int, str]
 _DIED = f"{TRIES} workers died at it, perhaps because memory was short, so use fewer workers"
 _one_at_a_time = threading.Lock()  # Taichi serves one thread, and workers can be threads
 
@@ -52,20 +51,17 @@ def completed(
 ) -> Iterator[tuple[Piece, Any]]:
     """Yield pieces of work with their outcomes as they come, or with the exception that they raise.
 
-    A piece is tried again if its worker dies, `TRIES` times in all.
+    A piece is tried again if its worker dies, `TRIES` times in all. Raises a LostWorkersError if
+    the executor takes no more work.
 
     Args:
-        pieces: The pieces; a few are taken at a time.
         work_of: A function that returns the work of a piece, a call that can be pickled.
         executor: The executor; None means this process.
         code: The plugins and modules that the workers need.
-
-    Raises:
-        LostWorkersError: The executor takes no more work.
     """
+    outcome: Any
     if executor is None:
         for piece in pieces:
-            outcome: Any
             try:
                 outcome = work_of(piece)()
             except Exception as error:
@@ -73,19 +69,14 @@ def completed(
                 outcome = error
             yield piece, outcome
         return
-    source, again, deaths = iter(pieces), deque[Piece](), Counter[Piece]()
+    waiting, deaths = deque(pieces), Counter[Piece]()
     coming: dict[Future[Any], Piece] = {}
-    fault: Any
     try:
-        while True:
+        while waiting or coming:
             workers = getattr(executor, "num_workers", 0) or available_threads()
-            while len(coming) < 2 * workers:
-                following = next(source, None)
-                if following is None and again:
-                    following = again.popleft()
-                if following is None:
-                    break
-                work = pickle.dumps(work_of(following), -1)
+            while waiting and len(coming) < 2 * workers:
+                piece = waiting.popleft()
+                work = pickle.dumps(work_of(piece), -1)
                 try:
                     future = executor.submit(run_pickled, versions(), tuple(code), work)
                 except (BrokenExecutor, RuntimeError) as refusal:
@@ -93,50 +84,42 @@ def completed(
                     raise LostWorkersError(
                         f"the executor takes no more work ({why}); {RESUME}."
                     ) from refusal
-                coming[future] = following
-            if not coming:
-                return
+                coming[future] = piece
             done, _ = concurrent.futures.wait(
                 coming, _LOOK_EVERY, concurrent.futures.FIRST_COMPLETED
             )
             stop_if_noted()
             getattr(executor, "check", lambda: None)()
             for future in done:
-                piece, fault = coming.pop(future), RuntimeError("cancelled")  # by somebody else
-                if not future.cancelled():
-                    fault = future.exception()
-                if fault and not isinstance(fault, Exception):  # a SystemExit, for example
-                    fault = RuntimeError(f"{type(fault).__name__}: {fault}")
-                if isinstance(fault, BrokenExecutor):
+                piece = coming.pop(future)
+                try:
+                    outcome = future.result()
+                except BrokenExecutor:
                     deaths[piece] += 1
                     if deaths[piece] < TRIES:
-                        again.append(piece)
+                        waiting.append(piece)
                         continue
-                    fault = LostWorkersError(_DIED)
-                yield piece, fault or future.result()
+                    outcome = LostWorkersError(_DIED)
+                except (Exception, SystemExit) as error:
+                    outcome = error
+                yield piece, outcome
     finally:
         for future in coming:
             future.cancel()
 
 
-def versions() -> Versions:
+def versions() -> str:
     """Return the versions of this package, its physics and Python, which all workers must have."""
-    return __version__, PHYSICS, ".".join(platform.python_version_tuple()[:2])
+    python = ".".join(platform.python_version_tuple()[:2])
+    return f"taichi_ants {__version__} (physics {PHYSICS}) and Python {python}"
 
 
-def run_pickled(of_study: Versions, code: Sequence[Code], pickled: bytes) -> Any:
-    """Return the outcome of pickled work; this is what workers run.
-
-    Raises:
-        AntsError: The worker has other `versions` than the study.
-    """
+def run_pickled(of_study: str, code: Sequence[Code], pickled: bytes) -> Any:
+    """Return the outcome of pickled work; AntsError if this worker has other `versions`."""
     if of_study != versions():
-        theirs, its = (
-            f"taichi_ants {package} (physics {physics}) and Python {python}"
-            for package, physics, python in (of_study, versions())
-        )
         raise AntsError(
-            f"the study runs with {theirs}, but a worker has {its}; install the same versions"
+            f"the study runs with {of_study}, but a worker has {versions()}; install the same "
+            "versions"
         )
     with _one_at_a_time:
         load_code(code)
@@ -144,14 +127,11 @@ def run_pickled(of_study: Versions, code: Sequence[Code], pickled: bytes) -> Any
 
 
 class Workers(Executor):
-    """Worker processes on this machine, which are replaced if they die.
+    """Worker processes on this machine, which are replaced if they die; AntsError for none.
 
     Each is a pool of one, so that its death costs its block only: a pool of several loses all
     blocks. The workers end with the `with` block; in case of an error, or if this process is
     killed, at once.
-
-    Raises:
-        AntsError: The number of workers is not a whole number above 0.
     """
 
     def __init__(self, workers: int) -> None:
@@ -160,6 +140,8 @@ class Workers(Executor):
         self._calls: list[set[Future[Any]]] = [set() for _ in range(workers)]
         # The workers have one end. They see that the other one is closed, also by a crash.
         self._end, self._line = multiprocessing.Pipe(duplex=False)
+        # Taichi cannot be forked.
+        self._start = multiprocessing.get_context("spawn"), _end_with, (self._end,)
 
     def submit(self, call: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
         """Return the future of a call in the worker that has the fewest calls."""
@@ -169,7 +151,7 @@ class Workers(Executor):
         with _without_ctrl_c():
             for _ in range(TRIES):
                 with suppress(BrokenExecutor):
-                    pool = self._pools[n] = self._pools[n] or _pool(self._end)
+                    pool = self._pools[n] = self._pools[n] or ProcessPoolExecutor(1, *self._start)
                     future = pool.submit(call, *given, **named)
                     self._calls[n].add(future)
                     return future
@@ -189,11 +171,6 @@ class Workers(Executor):
         self._line.close()
         self._end.close()
         self.shutdown(wait=False, cancel_futures=True)
-
-
-def _pool(end: Connection) -> ProcessPoolExecutor:
-    """Return a pool of one process; Taichi cannot be forked."""
-    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _end_with, (end,))
 
 
 @contextmanager

@@ -11,33 +11,40 @@ No process changes the files of another one, so several can work in a folder wit
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import json
 import os
+import platform
+import re
+import shlex
 import socket
+import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
+from importlib import metadata
 from operator import methodcaller
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import files
-from taichi_ants.errors import AntsError, count, shown
+from taichi_ants import __version__, files
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.settings import flat
-from taichi_ants.studies.provenance import provenance
 from taichi_ants.studies.store import BLOCKS, Arrays, Store
-from taichi_ants.studies.study import FailedBlocksError, Study, share_of
+from taichi_ants.studies.study import FailedBlocksError, Study
 
 STUDY, MANIFEST, REPORT, PAGE = "study.json", "manifest.json", "report.txt", "report.html"
 INPUTS, SESSIONS = "inputs", "sessions"
 _OF_ALL = (STUDY, INPUTS, BLOCKS, SESSIONS)
 _BESIDE_SETTINGS = "physics", "version", "plugin", "arch"  # what else determines results
+# Packages that results depend on, if this package runs without being installed, and extras.
+_DIRECT, _EXTRAS = ("taichi", "numpy", "scipy", "matplotlib"), ("pyarrow", "SALib", "ray")
 
 
 @dataclass(frozen=True)
@@ -54,11 +61,11 @@ class Results:
     study: Study
     folder: Path
     store: Store
-    made: Mapping[str, Any] = field(default_factory=dict)
-    figures: bool = True
-    parquet: bool = False
-    part: bool = False
-    arch: str = "cpu"
+    made: Mapping[str, Any]
+    figures: bool
+    parquet: bool
+    part: bool
+    arch: str
 
     @property
     def read(self) -> Callable[..., Arrays]:
@@ -80,11 +87,7 @@ def asked_in(folder: Path) -> dict[str, Any]:
 
 
 def json_in(path: Path) -> dict[str, Any] | None:
-    """Return the facts in a file that `write_json` wrote; None if it is missing.
-
-    Raises:
-        AntsError: The file is damaged.
-    """
+    """Return the facts in a file of `write_json`; None if it is missing, AntsError if damaged."""
     if not path.exists():
         return None
     try:
@@ -108,25 +111,21 @@ def write_json(path: Path, facts: Mapping[str, Any]) -> None:
 def ask(folder: Path, asked: Mapping[str, Any], inputs: Mapping[str, bytes], force: bool) -> None:
     """Write down what a study asks for, and copies of the files that it has read.
 
-    `inputs` are their contents by their paths in the folder. With `force`, the study can lack what
-    the folder has.
-
-    Raises:
-        AntsError: The folder has other files, or points or seeds that the study lacks.
+    `inputs` are their contents by their paths in the folder. Raises an AntsError, except with
+    `force`, if the folder has other files, or points or seeds that the study lacks.
     """
     before = json_in(folder / STUDY)
     if before == asked:
         return
-    if before and not force:
-        _check_grows(folder, before, asked)
-    elif not force and folder.is_dir() and any(p.name not in _OF_ALL for p in folder.glob("[!.]*")):
+    has_others = folder.is_dir() and any(p.name not in _OF_ALL for p in folder.glob("[!.]*"))
+    if before is None and has_others and not force:
         raise AntsError(
             f"{files.named(folder)} contains files, but no results; choose another --out, or give "
             "--force to add results to them."
         )
-    files.check_writable_folder(folder)
+    if before and not force:
+        _check_grows(folder, before, asked)
     for name, content in inputs.items():
-        files.check_writable_folder((folder / name).parent, folder)
         files.write_atomically(folder / name, methodcaller("write", content))
     write_json(folder / STUDY, asked)
 
@@ -152,10 +151,9 @@ def _check_grows(folder: Path, before: Mapping[str, Any], asked: Mapping[str, An
 @contextmanager
 def session(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
     """Return a context in which a file says that this process computes, and then how it ended."""
-    sessions = files.check_writable_folder(folder / SESSIONS, folder)
-    began, name = time.time(), f"{time.strftime('%Y%m%dT%H%M%S')}-{socket.gethostname()}"
+    name = f"{time.strftime('%Y%m%dT%H%M%S')}-{socket.gethostname()}-{os.getpid()}.json"
+    path, began = folder / SESSIONS / name, time.time()
     facts = {**provenance(sys.argv), "shard": shard, "began": began, "seconds": None, "failed": []}
-    path = sessions / f"{name}-{os.getpid()}.json"
     files.write_text(path, files.to_json(facts, indent=1))
     try:
         yield
@@ -177,41 +175,23 @@ def sessions_in(folder: Path) -> list[dict[str, Any]]:
     return sorted(sessions, key=lambda facts: facts["began"])
 
 
-def is_finished(folder: Path, asked: Mapping[str, Any], figures: bool, parquet: bool) -> bool:
-    """Return whether a folder has all tables that were asked for, and they are unchanged."""
-    manifest = json_in(folder / MANIFEST)
-    return bool(
-        manifest
-        and manifest.get("study") == files.checksum_of_json(asked)
-        and (manifest["figures"] or not figures)
-        and (manifest["parquet"] or not parquet)
-        and all(
-            (folder / name).is_file() and checksum_of(folder / name) == checksum
-            for name, checksum in manifest["files"].items()
-        )
+def is_finished(folder: Path, asked: Mapping[str, Any], manifest: Mapping[str, Any]) -> bool:
+    """Return whether a folder has all files of a manifest, unchanged, as they were asked for."""
+    return manifest.get("study") == files.checksum_of_json(asked) and all(
+        (folder / name).is_file() and checksum_of(folder / name) == checksum
+        for name, checksum in manifest["files"].items()
     )
 
 
-def publish(folder: Path, ready: Path, made: Mapping[str, Any] | None) -> None:
-    """Move ready files into a folder of results, and then write the manifest with facts.
-
-    Removes the files that an older manifest lists. None for `made`: the results are unfinished.
-    """
-    paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
-    checksums = {path.as_posix(): checksum_of(ready / path) for path in paths}
-    with suppress(AntsError):  # a damaged manifest is replaced
-        for name in (json_in(folder / MANIFEST) or {"files": ()})["files"]:
-            file = folder / name
-            if name not in checksums and file.resolve().is_relative_to(folder.resolve()):
-                file.unlink(missing_ok=True)
-    for path in paths:
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        os.replace(ready / path, folder / path)
-    if made is None:
-        (folder / MANIFEST).unlink(missing_ok=True)
-    else:
-        study = files.checksum_of_json(asked_in(folder))
-        write_json(folder / MANIFEST, {**made, "study": study, "files": checksums})
+def finished(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a folder; AntsError unless all its files are there, unchanged."""
+    asked, manifest = asked_in(folder), json_in(folder / MANIFEST) or {}
+    if not is_finished(folder, asked, manifest):
+        raise AntsError(
+            f"{files.named(folder)} has no finished results, or some of them have changed; run the "
+            "command of this folder again, which writes what is missing."
+        )
+    return manifest
 
 
 def checksum_of(path: Path) -> str:
@@ -220,39 +200,64 @@ def checksum_of(path: Path) -> str:
         return hashlib.sha256(file.read()).hexdigest()
 
 
-def status(folder: Path) -> Iterator[str]:
-    """Yield lines about a folder of results.
+def provenance(arguments: Sequence[str]) -> dict[str, Any]:
+    """Return the command, time, source, versions and machine, for the manifest of results.
 
-    Raises:
-        AntsError: The folder has no study, or its description is damaged.
+    A command with an absolute path, as an installed one has, is recorded by its name alone.
     """
-    asked, store, sessions = asked_in(folder), Store(folder), sessions_in(folder)
-    numbers, blocks = store.where(asked["points"], asked["seeds"], asked["arrays"])
-    done, manifest = numbers >= 0, json_in(folder / MANIFEST)
-    if done.all() and manifest and manifest.get("study") == files.checksum_of_json(asked):
-        yield f"finished: results with {count(done.size, 'run')}, since {manifest['finished']}"
-        return
-    seconds = np.broadcast_to(np.array(asked["seconds"])[:, None], done.shape)
-    share = 100 * seconds[done].sum() / seconds.sum()
-    yield (
-        f"unfinished: {done.sum()} of {count(done.size, 'run')} done ({share:.0f} % of the work), "
-        f"in {count(len(np.unique(numbers[done])), 'block')}"
-    )
-    for number, shards in sorted({tuple(facts["shard"]) for facts in sessions} - {(1, 1)}):
-        mine = share_of(seconds, asked["families"], number, shards)
-        yield f"shard {number} of {shards}: {done[mine].sum()} of {count(mine.sum(), 'run')} done"
-    times = np.array([block.path.stat().st_mtime for block in blocks])
-    new = done & (times[numbers] > sessions[-1]["began"]) if sessions and blocks else done & False
-    if new.any() and not done.all():
-        speed = seconds[new].sum() / (times.max() - sessions[-1]["began"])
-        yield f"left: about {_duration(seconds[~done].sum() / speed)}"
-    yield from (f"failed: {block}" for block in (sessions[-1]["failed"] if sessions else ()))
-    if blocks:
-        yield f"last block: {_duration(max(0.0, time.time() - times.max()))} ago"
+    program, *options = arguments
+    if os.path.isabs(program):
+        program = Path(program).name.replace("__main__.py", "taichi-ants")
+    return {
+        "command": shlex.join((program, *options)),
+        "finished": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
+        **source(),
+        "python": platform.python_version(),
+        "packages": packages(),
+        "platform": platform.platform(),
+        "processor": processor(),
+        "cpus": os.cpu_count(),
+    }
 
 
-def _duration(seconds: float) -> str:
-    for size, unit in ((86400, "day"), (3600, "hour"), (60, "minute")):
-        if seconds >= 2 * size:
-            return count(round(seconds / size), unit)
-    return count(round(seconds), "second")
+def source() -> dict[str, Any]:
+    """Return the `commit` of this package's source, and whether it was `clean`.
+
+    Clean means that no tracked file differed from the commit. Both are None outside of a checkout.
+    """
+    root = Path(__file__).resolve().parents[2]
+    command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty"]
+    how: dict[str, Any] = {"stderr": subprocess.DEVNULL, "text": True, "timeout": 10}
+    with suppress(OSError, subprocess.SubprocessError):
+        if (root / ".git").exists():
+            described = subprocess.check_output(command, cwd=root, **how).strip()
+            commit, _, changed = described.partition("-")
+            return {"commit": commit, "clean": not changed}
+    return {"commit": None, "clean": None}
+
+
+def packages(also: Iterable[str] = ()) -> dict[str, str]:
+    """Return the versions of this package and of those that it depends on, also indirectly.
+
+    Includes extras that this process has imported, and installed packages in `also`.
+    """
+    versions = dict[str, str]()
+    waiting = ["taichi-ants", *_DIRECT, *(name for name in _EXTRAS if name in sys.modules), *also]
+    for name in waiting:  # which grows
+        with suppress(metadata.PackageNotFoundError):
+            if name not in versions:
+                versions[name] = metadata.version(name)
+                needed = (line for line in metadata.requires(name) or () if "extra ==" not in line)
+                names = (re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in needed)
+                waiting += [re.sub(r"[-_.]+", "-", name).lower() for name in names]
+    versions.pop("taichi-ants", None)
+    return {"taichi_ants": __version__, **dict(sorted(versions.items()))}
+
+
+def processor() -> str:
+    """Return the name of the processor, or of its architecture if the name is unknown."""
+    with suppress(OSError, StopIteration):
+        lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
+        line = next(line for line in lines if line.startswith("model name"))
+        return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

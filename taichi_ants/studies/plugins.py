@@ -20,6 +20,7 @@ Code = Mapping[str, bytes]  # a file by its path, and then the files in its fold
 _imports: dict[str, ModuleSpec | None] = {}  # files that plugins import from their folders
 _finder: Any = SimpleNamespace(find_spec=lambda name, *_: _imports.get(name))  # see `sys.meta_path`
 _loaded: dict[str, list[bytes]] = {}  # what `load_code` has loaded, by the name of the file
+_UNREADABLE = "cannot read the plugin {!r}; name a Python file (.py)."
 _folders: list[tempfile.TemporaryDirectory[str]] = []  # of loaded code, until this process ends
 
 
@@ -41,9 +42,7 @@ def read_plugin(path: str | None) -> dict[str, bytes]:
         try:
             code[str(file)] = file.read_bytes()
         except (OSError, ValueError) as error:
-            raise AntsError(
-                f"cannot read the plugin {path!r}; name a Python file (.py)."
-            ) from error
+            raise AntsError(_UNREADABLE.format(path)) from error
         if file.suffix == ".py" or file == Path(path):
             waiting += _needed(folder, file, code[str(file)])
     return code
@@ -81,15 +80,15 @@ def load_plugin(path: str | None, code: Code | None = None) -> Any:
         return None
     spec: Any = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
     if spec is None:
-        raise AntsError(f"cannot read the plugin {path!r}; name a Python file (.py).")
+        raise AntsError(_UNREADABLE.format(path))
     if _finder not in sys.meta_path:
         sys.meta_path.insert(0, _finder)
     module = importlib.util.module_from_spec(spec)
     try:
         for file in [*map(Path, code or read_plugin(path))][1:]:
-            is_beside = file.parent == Path(path).parent
-            if file.suffix == ".py" and (is_beside or file.stem == "__init__"):
-                _let_import(file)
+            is_package = file.stem == "__init__"
+            if file.suffix == ".py" and (is_package or file.parent == Path(path).parent):
+                _let_import(file, file.parent.name if is_package else file.stem)
         sys.modules[spec.name] = module  # Taichi reads the source of functions by their module
         spec.loader.exec_module(module)
     except AntsError:
@@ -102,9 +101,8 @@ def load_plugin(path: str | None, code: Code | None = None) -> Any:
     return module
 
 
-def _let_import(path: Path) -> None:
+def _let_import(path: Path, name: str) -> None:
     """Let Python find the module or package of a file by its name alone."""
-    name = path.parent.name if path.stem == "__init__" else path.stem
     _imports[name] = importlib.util.spec_from_file_location(name, path)
     before = getattr(sys.modules.get(name), "__file__", None)
     if before and Path(before).resolve() != path.resolve():  # that of another plugin

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,33 +31,26 @@ _ENVIRONMENT = {
 class RayWorkers(Executor):
     """Workers that Ray starts, each with `threads` processors, and a GPU for "cuda".
 
-    Ray must not run in this process. It is connected until the `with` block ends. If a worker or
-    its machine dies, Ray repeats the call elsewhere. The workers of a cluster run the source of
-    this package that this process runs.
-
-    Args:
-        address: HOST:PORT of a cluster that this machine belongs to; None starts Ray on this
-            machine alone, and ends it.
-
-    Raises:
-        AntsError: Ray is not installed, or no cluster is at the address.
+    The `address` is HOST:PORT of a cluster that this machine belongs to, whose workers run the
+    source of this package that this process runs. None starts Ray on this machine alone, until the
+    `with` block ends. If a worker or its machine dies, Ray repeats the call elsewhere. Raises an
+    AntsError if Ray is not installed, or no cluster is at the address.
     """
 
     def __init__(self, address: str | None = None, threads: int = 1, arch: str = "cpu") -> None:
         for name, value in _ENVIRONMENT.items():
             os.environ.setdefault(name, value)
-        where: dict[str, Any] = {"address": "local", "num_cpus": available_threads()}
-        where["include_dashboard"] = False
+        where: dict[str, Any] = {"num_cpus": available_threads(), "include_dashboard": False}
         if address:
             _check_listens(address)
-            if _has_token():  # `ray start` demands it then; clusters without tokens ignore it
-                os.environ.setdefault("RAY_AUTH_MODE", "token")
             own = str(Path(taichi_ants.__file__).parent)
-            where = {"address": address, "runtime_env": {"py_modules": [own]}}
+            where = {"runtime_env": {"py_modules": [own]}}
         self._ray = imported("a cluster", "ray", "ray")
         with _quiet_start():
             try:
-                self._ray.init(**where, logging_level="ERROR", log_to_driver=False)
+                self._ray.init(
+                    address or "local", **where, logging_level="ERROR", log_to_driver=False
+                )
             except (Exception, SystemExit) as error:
                 why = (str(error).strip() or type(error).__name__).splitlines()[0].rstrip(".:")
                 raise AntsError(
@@ -65,21 +59,17 @@ class RayWorkers(Executor):
                     "RAY_AUTH_TOKEN to the one that `ray get-auth-token` prints on the head."
                 ) from error
         self._head: str = self._ray.get_runtime_context().gcs_address
-        gpus = int(arch == "cuda")
-        self._remote = self._ray.remote(num_cpus=threads, num_gpus=gpus, max_retries=_RETRIES)
-        self._tasks: dict[Callable[..., Any], Any] = {}
-        has = self._ray.cluster_resources()
-        room = min(int(has.get(name, 0) // n) for name, n in (("CPU", threads), ("GPU", gpus)) if n)
+        how = {"num_cpus": threads, "num_gpus": int(arch == "cuda"), "max_retries": _RETRIES}
+        self._remote = cache(self._ray.remote(**how))
+        room = int(self._ray.cluster_resources().get("CPU", 0) // threads)
         self.num_workers = max(_LEAST, room)  # for machines that join later
         self._looked = time.monotonic()
 
     def submit(self, call: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
         """Return the future of a call in a worker."""
-        if call not in self._tasks:
-            self._tasks[call] = self._remote(call)
         mine: Future[Any] = Future()
         mine.set_running_or_notify_cancel()
-        theirs = self._tasks[call].remote(*given, **named).future()
+        theirs = self._remote(call).remote(*given, **named).future()
         theirs.add_done_callback(lambda done: self._pass_on(mine, done))
         return mine
 
@@ -111,12 +101,6 @@ class RayWorkers(Executor):
 
     def __exit__(self, *raised: object) -> None:
         self._ray.shutdown()
-
-
-def _has_token() -> bool:
-    """Return whether this machine has a token of Ray, by which clusters know their users."""
-    names = {"RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"}
-    return bool(names & os.environ.keys()) or Path("~/.ray/auth_token").expanduser().exists()
 
 
 def _check_listens(address: str) -> None:

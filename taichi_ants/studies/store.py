@@ -13,8 +13,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -50,8 +50,7 @@ class DamagedError(AntsError):
 class Store:
     """The runs in a folder, which need not exist.
 
-    Attributes:
-        damaged: The files that could not be read, and were renamed to `NAME.damaged`.
+    `damaged` are the files that could not be read, and were renamed to `NAME.damaged`.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -62,21 +61,19 @@ class Store:
 
     def refresh(self) -> None:
         """Take notice of the files that other processes have added or removed."""
-        names = set(os.listdir(self.folder)) if self.folder.is_dir() else set()
-        self._blocks = {name: block for name, block in self._blocks.items() if name in names}
-        for name in sorted(names - self._blocks.keys()):
-            if name.endswith(".npz") and (block := _header(self.folder / name)):
-                self._blocks[name] = block
-            elif name.endswith(".npz"):
-                self._set_aside(self.folder / name)
+        paths = {path.name: path for path in sorted(self.folder.glob("*.npz"))}
+        self._blocks = {name: block for name, block in self._blocks.items() if name in paths}
+        for name, path in paths.items():
+            if name not in self._blocks:
+                with suppress(DamagedError):
+                    self._blocks[name], _ = self._load(path)
 
     def where(
         self, points: Sequence[str], seeds: Sequence[int], arrays: Sequence[str]
     ) -> tuple[np.ndarray, list[Stored]]:
-        """Return which file has all of these arrays of each run.
+        """Return the index of a file with these arrays for each run, and the files.
 
-        Returns:
-            Indices of files, int64 (points, seeds), -1 for missing runs; and the files.
+        The indices are int64 (points, seeds), and -1 for missing runs.
         """
         rows = {key: n for n, key in enumerate(points)}
         columns = {seed: n for n, seed in enumerate(seeds)}
@@ -97,21 +94,16 @@ class Store:
         header = json.dumps([list(points), list(seeds), list(arrays)])
         path = self.folder / f"{hashlib.sha256(header.encode()).hexdigest()[:32]}.npz"
         content: dict[str, Any] = {_ABOUT: np.array(header), **arrays}
-        with files.writing(self.folder):
-            self.folder.mkdir(parents=True, exist_ok=True)
         files.write_atomically(path, lambda file: np.savez(file, **content))
         self._blocks[path.name] = Stored(path, tuple(points), tuple(seeds), tuple(arrays))
 
     def read(
         self, points: Sequence[str], seeds: Sequence[int], arrays: Sequence[str], part: bool = False
     ) -> Arrays:
-        """Return arrays and their parts, (points, seeds, ...).
+        """Return arrays and their parts, (points, seeds, ...); DamagedError if a file is damaged.
 
-        With `part`, runs can be missing: their floats are nan, and other numbers 0.
-
-        Raises:
-            DamagedError: A file cannot be read.
-            KeyError: Runs are missing.
+        With `part`, runs can be missing: their floats are nan, and other numbers 0. Without it, a
+        missing run is a KeyError.
         """
         numbers, blocks = self.where(points, seeds, arrays)
         if (numbers < 0).any() and not part:
@@ -121,11 +113,8 @@ class Store:
             block, (p, s) = blocks[number], np.nonzero(numbers == number)
             row = {key: n for n, key in enumerate(block.points)}
             column = {seed: n for n, seed in enumerate(block.seeds)}
-            inside = (
-                np.array([row[points[n]] for n in p.tolist()]),
-                np.array([column[seeds[n]] for n in s.tolist()]),
-            )
-            for name, array in self._arrays(block, arrays).items():
+            inside = [row[points[n]] for n in p.tolist()], [column[seeds[n]] for n in s.tolist()]
+            for name, array in self._load(block.path, arrays)[1].items():
                 if name not in whole:
                     nothing = np.nan if array.dtype.kind == "f" else 0
                     shape = *numbers.shape, *array.shape[2:]
@@ -135,40 +124,24 @@ class Store:
                 whole[name][p, s] = array[inside]
         return whole
 
-    def _arrays(self, block: Stored, names: Sequence[str]) -> Arrays:
-        parts = [part for name in names for part in parts_of(name, block.arrays)]
+    def _load(self, path: Path, names: Sequence[str] = ()) -> tuple[Stored, Arrays]:
+        """Return what a file holds, and some of its arrays; DamagedError after setting it aside."""
         try:
-            with _opened(block.path) as file:
-                return {part: file[part] for part in parts}  # zipfile checks their CRC-32
+            with files.opened(path) as file, np.load(file, allow_pickle=False) as arrays:
+                points, seeds, every = map(tuple, json.loads(str(arrays[_ABOUT])))
+                if set(arrays.files) != {_ABOUT, *every}:
+                    raise ValueError("arrays are missing")
+                parts = [part for name in names for part in parts_of(name, every)]
+                # zipfile checks their CRC-32.
+                return Stored(path, points, seeds, every), {part: arrays[part] for part in parts}
         except MemoryError:
             raise
         except Exception as error:  # zipfile, zlib and NumPy raise many kinds
-            self._set_aside(block.path)
+            self._blocks.pop(path.name, None)
+            self.damaged.append(path)
+            with files.writing(path):
+                os.replace(path, path.with_suffix(".damaged"))
             raise DamagedError(
-                f"{files.named(block.path)} is damaged, so its runs are missing; run the command "
-                "again to compute them."
+                f"{files.named(path)} is damaged, so its runs are missing; run the command again "
+                "to compute them."
             ) from error
-
-    def _set_aside(self, path: Path) -> None:
-        self._blocks.pop(path.name, None)
-        self.damaged.append(path)
-        with files.writing(path):
-            os.replace(path, path.with_suffix(".damaged"))
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """Yield the arrays of a regular file, which are read when they are asked for."""
-    with files.opened(path) as file, np.load(file, allow_pickle=False) as arrays:
-        yield arrays
-
-
-def _header(path: Path) -> Stored | None:
-    """Return what a file holds; None if it is damaged."""
-    try:
-        with _opened(path) as file:
-            points, seeds, arrays = json.loads(str(file[_ABOUT]))
-            is_whole = set(file.files) == {_ABOUT, *arrays}
-        return Stored(path, tuple(points), tuple(seeds), tuple(arrays)) if is_whole else None
-    except Exception:  # zipfile, zlib and NumPy raise many kinds
-        return None

@@ -51,8 +51,6 @@ class Study:
     """Points that all run with the same seeds.
 
     Attributes:
-        points: The points.
-        seeds: The seeds.
         arrays: The names of the arrays that are kept of each run: those of the outcome of its
             point, and those that `measure` adds.
         measure: A function at the top level of a module, or a `partial` of one.
@@ -178,15 +176,12 @@ def run(
     code: Sequence[Code] = (),
     **where: Any,
 ) -> None:
-    """Compute and save the runs of a study that a store lacks.
+    """Compute and save the runs of a study that a store lacks, a file for each block.
 
     Args:
-        study: The study.
-        store: The store, which gets a file for each block.
-        executor: See `executors.completed`; None computes in this process.
+        executor, code: See `executors.completed`.
         shard: The number of a shard, from 1, and the number of shards, to compute only its runs.
         progress: A function that is called with the finished share of the work.
-        code: The plugins and modules that workers need.
         where: The arguments `threads` and `arch` of `train`.
 
     Raises:
@@ -203,23 +198,22 @@ def run(
         progress(1.0 - max(0.0, left - more) / max(total, 1e-9))
 
     show()
-    for number, (stage, runs) in enumerate(stages):
+    for stage, runs in stages:
         work = partial(_work, stage, store, where, None if executor else show)
         wanted = runs & stage.missing(store)  # the stage before has computed some of them
-        later = stages[number + 1 :]
-        left = stage.seconds[wanted].sum() + sum(s.seconds[r].sum() for s, r in later)
+        left -= stage.seconds[runs & ~wanted].sum()
         for block, outcome in completed(list(stage.blocks(wanted)), work, executor, code):
-            if isinstance(outcome, Exception):
-                text = " ".join(str(outcome).split()).rstrip(".")
-                kind = "" if isinstance(outcome, AntsError) else f"{type(outcome).__name__}: "
-                failed.append(f"{stage.named(block)} ({kind}{text})")
-                if len(failed) == _HOPELESS and not (mine & ~study.missing(store)).any():
-                    break
+            if not isinstance(outcome, BaseException):
+                keys = [stage.keys[p] for p in block.points]
+                store.add(keys, [stage.seeds[s] for s in block.seeds], outcome)
+                left -= stage.seconds[np.ix_(*block)].sum()
+                show()
                 continue
-            keys = [stage.keys[p] for p in block.points]
-            store.add(keys, [stage.seeds[s] for s in block.seeds], outcome)
-            left -= stage.seconds[np.ix_(*block)].sum()
-            show()
+            text = " ".join(str(outcome).split()).rstrip(".")
+            kind = "" if isinstance(outcome, AntsError) else f"{type(outcome).__name__}: "
+            failed.append(f"{stage.named(block)} ({kind}{text})")
+            if len(failed) == _HOPELESS and not (mine & ~study.missing(store)).any():
+                break
         if failed:
             raise FailedBlocksError(failed)
 

@@ -91,11 +91,7 @@ class Sweep:
 
 
 def plan(options: Mapping[str, Any]) -> Sweep:
-    """Return the sweep of the option `file`; this makes a module of a study, see `studies.command`.
-
-    Raises:
-        AntsError: The file cannot be read, or a setting is not allowed; the message names the file.
-    """
+    """Return the sweep of the option `file`; AntsError, which names the file, if it is wrong."""
     path = Path(options["file"])
     text = files.read_text(path)
     try:
@@ -124,8 +120,7 @@ def sweep_of(file: Settings) -> Sweep:
         raise AntsError(f"sensitivity is for one [vary] table, but there are {len(grids)}.")
     built = dict[str, Any]()
     points = tuple(base.point(row, built) for row in rows)
-    check_training(base.fixed, points)
-    for of_table, names in grids:
+    for of_table, names in [(slice(None), base.fixed), *grids]:
         check_training(names, points[of_table])
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
@@ -197,16 +192,18 @@ def tables(sweep: Sweep, results: Results) -> str:
         return sweeps.report(settings, values)
 
     first = next(iter(values))
-    findings = sweep.findings(values[first])
+    findings, order, title = sweep.findings(values[first]), list(range(len(settings))), ""
     if sweep.against:
         more = ["finding", "difference", "low", "high", *["left_out"] * (first in gaps)]
         columns = [*sweeps.columns_of(sweep.settings), *more]
         files.write_csv(folder / "findings.csv", findings.values(), columns)
-    if sweep.design.is_grid:
-        notes = [findings.get(n, {}).get("finding", "") for n in range(len(sweep.settings))]
-        report = sweeps.report(sweep.settings, values, sweep.against, notes)
-    else:
-        report = _report_on_highest(sweep, values)
+    if not sweep.design.is_grid:  # nan comes last
+        order = np.argsort(-known_means(values[first]), kind="stable")[:_SHOWN_POINTS].tolist()
+        title = f"The {len(order)} of {len(settings)} points with the highest {first}:\n\n"
+    highest = {name: array[order] for name, array in values.items()}
+    notes = [findings.get(n, {}).get("finding", "") for n in order]
+    report = sweeps.report([settings[n] for n in order], highest, sweep.against, notes)
+    report = f"{title}{report}"
     if sweep.design.sensitivity:
         ((_, axes),), seeds = sweep.grids, len(sweep.study.seeds)
         names = list(design.varying(axes))
@@ -235,16 +232,6 @@ def _series(sweep: Sweep, results: Results) -> tables_of.Table:
             columns["measure"] = np.full(len(s), name.removeprefix(SERIES), object)
             parts.append({**columns, "value": values.ravel()})
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def _report_on_highest(sweep: Sweep, values: dict[str, np.ndarray]) -> str:
-    """Return a report on the points of a design with the highest first measure."""
-    name, means = next(iter(values)), known_means(next(iter(values.values())))
-    order = np.argsort(-means, kind="stable")[:_SHOWN_POINTS]  # nan comes last
-    rows = {measure: array[order] for measure, array in values.items()}
-    table = sweeps.report([sweep.settings[n] for n in order], rows)
-    most = f"the {len(order)} with the highest {name}" if len(order) < len(means) else "all"
-    return f"{len(means)} points of the design {sweep.design.design!r}; {most}:\n\n{table}"
 
 
 def _draw(sweep: Sweep, measure: str, values: np.ndarray, folder: Path) -> None:

@@ -101,10 +101,16 @@ class Base(NamedTuple):
                     )
             self._check_has_table(name)
             if isinstance(values, dict):
-                axes[name] = self._range(name, values)
-            else:
-                _check_once(name, values)
-                axes[name] = values
+                declaration = declaration_of(name, self.fixed)
+                of_points = (f.name for f in fields(KINDS[self.kind]) if "int" in str(f.type))
+                is_whole = name in ("world.seed", *of_points)
+                whole = declaration.kind is int if declaration else is_whole
+                axes[name] = Range.of(name, values, whole)
+                continue
+            axes[name] = values
+            for n, value in enumerate(values):
+                if value in values[:n]:
+                    raise AntsError(f"{name} has {shown(value)} more than once; remove one.")
         return axes
 
     def _check_has_table(self, name: str) -> None:
@@ -118,17 +124,6 @@ class Base(NamedTuple):
             table = table.get(key) if isinstance(table, dict) else None
         if table is None:
             raise AntsError(f"{name} is in [vary], but the file has no table {entry[0]}; add it.")
-
-    def _range(self, name: str, table: Settings) -> Range:
-        """Return a range, whose ends are checked, because drawn points lack them."""
-        declaration = declaration_of(name, self.fixed)
-        if declaration is None:
-            of_points = (f.name for f in fields(KINDS[self.kind]) if "int" in str(f.type))
-            return Range.of(name, table, name in ("world.seed", *of_points))
-        limits = Range.of(name, table, declaration.kind is int)
-        for end in (limits.low, limits.high):
-            declaration.checked(end)
-        return limits
 
     def point(self, row: Settings, built: dict[str, Any]) -> Point:
         """Return the point of the fixed settings and a row of others.
@@ -197,12 +192,6 @@ def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
 
 def as_list(value: Any) -> list:
     return value if isinstance(value, list) else [value]
-
-
-def _check_once(name: str, values: list) -> None:
-    for n, value in enumerate(values):
-        if value in values[:n]:
-            raise AntsError(f"{name} has {shown(value)} more than once; remove one of them.")
 
 
 def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:

@@ -2,12 +2,12 @@
 
 from taichi_ants.worlds.double_bridge import double_bridge
 from taichi_ants.worlds.open_world import far_piles, open_world
-from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.registry import (
     build,
     check_seed_counts,
     is_drawn,
     names,
+    paper,
     register,
     settings_of,
 )

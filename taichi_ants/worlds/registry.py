@@ -1,4 +1,4 @@
-"""The registry of worlds: functions that return a `World`, by name."""
+"""The registry of worlds: functions that return a `World`, by name; the paper's world."""
 
 from __future__ import annotations
 
@@ -8,14 +8,25 @@ from collections.abc import Callable
 from typing import Any
 
 from taichi_ants.errors import AntsError, expect, shown, whole
-from taichi_ants.files import inputs
+from taichi_ants.files import place_of
 from taichi_ants.registry import Registry
 from taichi_ants.settings import DeclaredSetting, declared, not_a_setting
 from taichi_ants.worlds.double_bridge import double_bridge
 from taichi_ants.worlds.open_world import far_piles, open_world
-from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.text_map import load_map
 from taichi_ants.worlds.world import World
+
+
+def paper() -> World:
+    """Return the paper's world: 271 cells, one food item, and a trail along the whole x axis."""
+    return World(
+        ranges=(10, 10, 10),
+        queen=(0, 9, 9),
+        foods=[(9, 0, 0)],
+        trails=[((i, 0, 0), 25) for i in range(-8, 9)],
+        ants=[((0, 8, 8), 0)],
+    )
+
 
 Builder = Callable[..., World]
 BUILT_IN: dict[str, Builder] = {
@@ -85,7 +96,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **settings: Any) 
             of = f"the world {shown(name_or_path)}"
             raise AntsError(f"`world.{name}` {not_a_setting(name, sorted(allowed), of)}")
     if builder is None:
-        if os.path.exists(inputs.place_of(name_or_path)):
+        if os.path.exists(place_of(name_or_path)):
             return load_map(name_or_path)
         raise WORLDS.unknown(os.fspath(name_or_path), "give the path of a map file that exists, ")
     world = builder(**settings, **({"seed": seed} if is_drawn(name_or_path) else {}))

@@ -61,15 +61,6 @@ def test_a_criterion_judges_intervals(criterion: Criterion, intervals: dict) -> 
         assert {criterion.judge(*pair) for pair in ends} == {verdict}
 
 
-def test_criteria_say_what_they_are() -> None:
-    assert above().words == "above 0, margin 0"
-    assert Criterion(0.5, 3, 0.5).words == "above 0.5 and at most 3, margin 0.5"
-    assert Criterion(10, margin=2).words == "above 10, margin 2"
-    assert Criterion(2, 4).words == "from 2 to 4"
-    assert Criterion(-np.inf, 4).words == "at most 4"
-    assert Criterion(2, np.inf).words == "at least 2"
-
-
 def verdict_of(effects: dict[str, list[float]], criterion: Criterion) -> tuple[Verdict, str, float]:
     """Verdict, contrast shown and its effect, of contrasts with these values of 20 seeds."""
     finding = finding_of(effects, criterion)

@@ -11,7 +11,7 @@ import pytest
 from command_lines import ROOT, assert_one_sentence, assert_same_results, call, contents
 
 from taichi_ants import commands
-from taichi_ants.studies import archive
+from taichi_ants.commands import reproduce
 from taichi_ants.studies.folder import asked_in, checksum_of, json_in, write_json
 
 PLUGIN = """
@@ -148,8 +148,9 @@ def test_a_difference_is_named_with_its_place(copy, capsys, monkeypatch):
     (copy / "more.txt").touch()
     rewrite(copy, "more.txt", str)
     assert call("archive", [copy], capsys)[0] == 0
-    known = archive.packages()
-    monkeypatch.setattr(archive, "packages", lambda: {**known, "numpy": "0", "scipy": None})
+    known = reproduce.packages()
+    others = {**known, "numpy": "0", "scipy": None}
+    monkeypatch.setattr(reproduce, "packages", lambda also: others)
     status, out, err = call("reproduce", ["copy.zip", "--trust-code"], capsys)
     assert status == 1
     assert "DIFFERENT  runs.csv (other content)" in out
@@ -209,9 +210,9 @@ def test_bad_archives_are_refused_and_leave_nothing(here, capsys, monkeypatch):
     }.items():
         assert words in refused("reproduce", [name, "--trust-code"], capsys), name
         assert {*Path().iterdir()} == before
-    with archive.unpacked(Path("slip.zip")) as place:  # nothing lands outside of the folder
-        assert not (place.parents[1] / "evil.py").exists()
-    monkeypatch.setattr(archive, "MOST_BYTES", 3 * len(content))
+    reproduce.unpack(Path("slip.zip"), "deep/folder")  # nothing lands outside of the folder
+    assert not Path("deep/evil.py").exists()
+    monkeypatch.setattr(reproduce, "MOST_BYTES", 3 * len(content))
     changed(good, "bomb.zip", [("results/zeros", bytes(4 * len(content)))])
     assert Path("bomb.zip").stat().st_size < 2 * len(content)
     assert "unpacks to more than" in refused("reproduce", ["bomb.zip"], capsys)

@@ -66,8 +66,8 @@ def test_a_stopped_colony_ends_at_a_whole_tick_with_all_its_files(tmp_path, caps
 
     with pytest.raises(SystemExit) as end:
         work()
-    assert (end.value.code, colony.ticks) == (143, 2)
-    assert Colony.load(save).ticks == 2
+    assert (end.value.code, colony.ticks) == (143, 1)
+    assert Colony.load(save).ticks == 1
     assert (tmp_path / "a.gif").exists()
 
 

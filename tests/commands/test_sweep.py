@@ -372,7 +372,7 @@ def test_ranges_of_events_are_checked_and_whole(tmp_path):
     events = [one.protocol[0] for one in plan({"file": tmp_path / "my.toml"}).study.points]
     assert len({event.tick for event in events}) == 4
     assert all(type(level) is int for event in events for _, level in event.task.values)
-    for end, said in (("from = -5", "`at.1.tick` is -5; it must be"), ("from = 5.5", "whole")):
+    for end, said in (("from = -50", "`at.tick` is -"), ("from = 5.5", "whole")):
         (tmp_path / "my.toml").write_text(text.replace("from = 5", end, 1))
         with pytest.raises(AntsError, match=said):
             plan({"file": tmp_path / "my.toml"})
@@ -404,23 +404,12 @@ def test_settings_of_a_training_that_does_not_happen_are_refused():
             sweep_of({**one, **training})
 
 
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        ({"evaluation_epsilon": 1.5}, "epsilon is 1.5; it must be a number between 0 and 1"),
-        (
-            {"task": {"choice": "deneubourg"}, "evaluation_epsilon": 0.1},
-            "evaluation_epsilon has no effect",
-        ),
-        ({"kind": "runs", "evaluation_epsilon": 0.1}, "is not a setting of a sweep of kind 'runs'"),
-    ],
-)
-def test_the_exploration_of_an_evaluation_is_checked(more, message):
+def test_the_exploration_of_an_evaluation_is_checked():
     file = {"kind": "colony", "measures": ["deliveries"], "episodes": 0, "vary": {"rollouts": [1]}}
-    file |= {} if "task" in more else {"policy": "random"}
-    file |= {"measures": ["greedy_return"]} if more.get("kind") == "runs" else {}
-    with pytest.raises(AntsError, match=message):
-        sweep_of({**file, **more})
+    with pytest.raises(AntsError, match="a number between 0 and 1"):
+        sweep_of({**file, "policy": "random", "evaluation_epsilon": 1.5})
+    with pytest.raises(AntsError, match="evaluation_epsilon has no effect"):
+        sweep_of({**file, "task": {"choice": "deneubourg"}, "evaluation_epsilon": 0.1})
 
 
 DESIGN = """
@@ -465,8 +454,7 @@ def test_a_design_has_rows_of_drawn_values_indices_and_figures(sweep):
     assert [(row["measure"], row["setting"].rpartition(".")[2]) for row in indices][:3] == [
         *(("blocked", "half_life"), ("blocked", "view"), ("blocked", "slip"))
     ]
-    assert all(0 <= row["seed_share"] <= 1 for row in indices)
-    assert "20 points of the design 'sobol'; the 10 with the highest blocked:" in out
-    assert "first order" in out
+    assert "The 10 of 20 points with the highest blocked:" in out
+    assert "first_order" in out
     again = sweep(DESIGN)
     assert "already has these results" in again[1]

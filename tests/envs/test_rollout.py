@@ -37,7 +37,7 @@ def assert_steps(env: Any, made: Rollout) -> None:
     """Take the actions of a rollout by `step`, and compare all results to the bit."""
     ended, finals = np.zeros(env.num_envs, bool), []
     for t, actions in enumerate(made.actions):
-        if env.autoreset_mode is DISABLED and env._over.any():
+        if env.autoreset_mode is DISABLED and env._ants.over().any():
             assert not made.rewards[t:, ended].any()
             assert not (made.terminated | made.truncated | made.events > 0)[t:, ended].any()
             assert (made.observations[t + 1 :, ended] == made.observations[t, ended]).all()
@@ -77,7 +77,7 @@ def compare(make: Any, before: int, lengths: list[int], seed: int) -> None:
         made = ours.rollout(actions)
         assert np.array_equal(made.actions, actions)
         assert_steps(theirs, made)
-        if ours.autoreset_mode is DISABLED and ours._over.any():
+        if ours.autoreset_mode is DISABLED and ours._ants.over().any():
             with pytest.raises(ResetNeeded, match=r"has ended; call reset\(\) with .* before ro"):
                 ours.rollout(actions)
             return
@@ -87,7 +87,7 @@ def compare(make: Any, before: int, lengths: list[int], seed: int) -> None:
             assert np.array_equal(one[k], other[k])
         for name in ("state", "action_mask", "event"):
             assert np.array_equal(one[4][name], other[4][name])
-        if ours.autoreset_mode is DISABLED and ours._over.any():
+        if ours.autoreset_mode is DISABLED and ours._ants.over().any():
             return
 
 
@@ -160,25 +160,13 @@ def test_forms_of_a_policy(tmp_path):
     assert not np.array_equal(made["result"].observations, made["name"].observations)
 
 
-def test_out_is_overwritten():
-    env, other = lone(), lone()
-    for one in (env, other):
-        one.reset(seed=2)
-    first = env.rollout("random", 20)
-    other.rollout("random", 20)
-    again, fresh = env.rollout("random", 20, out=first), other.rollout("random", 20)
-    for mine, its, old in zip(again[:-1], fresh[:-1], first[:-1], strict=True):
-        assert mine is old
-        assert np.array_equal(mine, its)
-
-
 def test_refuses():
     env = lone()
     with pytest.raises(ResetNeeded, match=r"^no episode has begun; call reset\(\) before rollout"):
         env.rollout("random", 3)
     env.reset(seed=1)
     n, n_states = env.num_envs, env._ants.task.n_states
-    before = env.rollout("random", 3)
+    env.rollout("random", 3)
     where = env._ants.batched.arrays["states"].copy()
     for error, message, policy, options in (
         (InvalidAction, rf"of shape \(1, {n}\)", np.zeros((0, n), int), {}),
@@ -197,8 +185,6 @@ def test_refuses():
         (AntsError, r"^steps is 2.5; ", "random", {"steps": 2.5}),
         (AntsError, r"^epsilon is 2; ", "random", {"steps": 3, "epsilon": 2}),
         (AntsError, r"^seed is 'a'; ", "random", {"steps": 3, "seed": "a"}),
-        (AntsError, r"^out is 3; it must be a Rollout", "random", {"steps": 3, "out": 3}),
-        (AntsError, r"^out.observations is .*\(5, ", "random", {"steps": 4, "out": before}),
     ):
         with pytest.raises(error, match=message):
             env.rollout(policy, **options)

@@ -1,17 +1,13 @@
-"""Policies that are functions, as tables; tables that act in environments."""
+"""Policies that are functions, as tables."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, evaluate, tabulate, worlds
+from taichi_ants import AntsError, tabulate
 from taichi_ants.envs.formats import FORMATS, Shown
-from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task import observations
-
-# Two that take the same greedy walk: without ties, so without chance.
-FOLLOWER = trail_follower() + 0.1 * np.linspace(1, 0, 5, dtype=np.float32)
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -46,16 +42,3 @@ def test_a_function_gets_each_state_as_environments_show_it(observation: str, fo
 def test_what_a_function_may_not_return(returned, said) -> None:
     with pytest.raises(AntsError, match=said):
         tabulate(returned)
-
-
-def test_a_table_that_was_learned_outside_is_evaluated() -> None:
-    """As Gymnasium's learners keep it: float64, or a dictionary of states that were seen."""
-    outside = FOLLOWER.astype(np.float64)
-    assert (evaluate(worlds.paper(), outside, rollouts=3).deliveries == 1).all()
-    sparse = {state: row for state, row in enumerate(outside) if row.any()}
-    with pytest.raises(AntsError, match="must be an array of real numbers"):
-        evaluate(worlds.paper(), sparse)  # type: ignore[arg-type]
-    with pytest.raises(AntsError, match=r"shape \(5, 128\); .* must end in \(128, 5\)"):
-        evaluate(worlds.paper(), outside.T)
-    with pytest.raises(AntsError, match=r"shape \(2, 4, 4, 4, 5\)"):
-        evaluate(worlds.paper(), outside.reshape(2, 4, 4, 4, 5))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
-from paper.claims import CLAIMS, Audit, assess, claims_rows
+from paper.claims import CLAIMS, Audit, assess, claims_rows, in_words
 from paper.comparison import (
     DYNA_P3,
     DYNA_P5,
@@ -16,7 +18,13 @@ from paper.comparison import (
 )
 from synthetic_comparison import Edit, build, change, level_truth, remeasured, unchanged
 
-from taichi_ants.analysis.findings import SIMULTANEOUS_LEVEL, Finding, Verdict
+from taichi_ants.analysis.findings import (
+    SIMULTANEOUS_LEVEL,
+    Criterion,
+    Finding,
+    Verdict,
+    above,
+)
 
 BY_ID = {claim.id: claim for claim in CLAIMS}
 
@@ -230,3 +238,12 @@ def test_the_tables_hold_the_findings() -> None:
     assert (row["estimator"], row["mean_effect"]) == ("interquartile mean", finding.by_mean.effect)
     share = rows[2 * list(BY_ID).index("sarsa-consistently-direct")]
     assert (share["estimator"], share["mean_verdict"]) == ("mean", None)
+
+
+def test_criteria_say_what_they_are() -> None:
+    assert in_words(above()) == "above 0, margin 0"
+    assert in_words(Criterion(0.5, 3, 0.5)) == "above 0.5 and at most 3, margin 0.5"
+    assert in_words(Criterion(10, margin=2)) == "above 10, margin 2"
+    assert in_words(Criterion(2, 4)) == "from 2 to 4"
+    assert in_words(Criterion(-math.inf, 4)) == "at most 4"
+    assert in_words(Criterion(2, math.inf)) == "at least 2"

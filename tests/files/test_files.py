@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import errno
 import os
-import stat
 import tempfile
 from pathlib import Path
 from typing import BinaryIO
@@ -32,37 +31,28 @@ def test_a_file_is_written_and_replaced(tmp_path: Path) -> None:
     assert names(tmp_path) == ["a.bin"]
 
 
-def test_a_failing_writer_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("error", "raised", "said"),
+    [
+        (KeyError("broken"), KeyError, "broken"),
+        (KeyboardInterrupt(), KeyboardInterrupt, "^$"),
+        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), AntsError, "a.bin': no space left"),
+    ],
+)
+def test_a_failing_writer_leaves_the_old_file_and_nothing_else(
+    error: BaseException, raised: type, said: str, tmp_path: Path
+) -> None:
     path = tmp_path / "a.bin"
     path.write_bytes(b"old")
 
     def writer(file: BinaryIO) -> None:
         file.write(b"half of the n")
-        raise KeyError("broken")
+        raise error
 
-    with pytest.raises(KeyError, match="broken"):
+    with pytest.raises(raised, match=said):
         files.write_atomically(path, writer)
     assert path.read_bytes() == b"old"
     assert names(tmp_path) == ["a.bin"]
-
-
-def test_an_interrupted_write_leaves_nothing(tmp_path: Path) -> None:
-    def writer(file: BinaryIO) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        files.write_atomically(tmp_path / "a.bin", writer)
-    assert names(tmp_path) == []
-
-
-def test_a_full_disk_is_reported_with_the_file(tmp_path: Path) -> None:
-    def writer(file: BinaryIO) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    with pytest.raises(AntsError, match="no space left") as raised:
-        files.write_atomically(tmp_path / "a.bin", writer)
-    assert str(tmp_path / "a.bin") in str(raised.value)
-    assert names(tmp_path) == []
 
 
 def test_a_replacement_that_fails_leaves_nothing(
@@ -75,14 +65,6 @@ def test_a_replacement_that_fails_leaves_nothing(
     with pytest.raises(AntsError, match="read-only file system"):
         files.write_text(tmp_path / "a.txt", "text")
     assert names(tmp_path) == []
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-def test_a_pipe_is_refused_and_stays(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(AntsError, match="not a regular file"):
-        files.write_text(tmp_path / "pipe", "text")
-    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
 
 
 def test_a_symbolic_link_is_followed(tmp_path: Path) -> None:
@@ -122,7 +104,6 @@ BAD_TARGETS = {
     "new/": "not a regular file",
     "pipe": "not a regular file",
     "/dev/null": "not a regular file",
-    "dangling": "no such file or directory",
     "file/below": "not a directory",
     "/proc/file": "no such file or directory",
     "n" * 256: "too long",
@@ -138,7 +119,6 @@ def test_a_file_that_cannot_be_written_is_told_before_the_work(
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").write_text("content")
     os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere" / "file")
     monkeypatch.chdir(tmp_path)
     before = names(tmp_path)
     with pytest.raises(AntsError, match=BAD_TARGETS[name]) as early:

@@ -102,17 +102,3 @@ def test_values_that_are_no_policy_are_refused_both_ways(
     with pytest.raises(AntsError, match=message) as raised:
         load_policy(path)
     assert str(path) in str(raised.value)
-
-
-@pytest.mark.parametrize(
-    ("arrays", "said"),
-    [
-        ({"q_values": random_policy(), "facts": '{"a":' * 100_000}, "not contain a policy"),
-        ({"facts": '{"kind": "policy", "version": 2}'}, "damaged"),
-    ],
-)
-def test_other_archives_are_refused(tmp_path: Path, arrays: dict, said: str) -> None:
-    path = tmp_path / "policy.npz"
-    np.savez(path, **arrays)
-    with pytest.raises(AntsError, match=f"{said}.*; name a file that save_policy wrote"):
-        load_policy(path)

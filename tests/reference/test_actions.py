@@ -110,19 +110,23 @@ def test_of_several_foods_the_draw_decides(foods, rng_state, taken):
 
 
 @pytest.mark.parametrize(
-    "contents",
+    ("action", "contents"),
     [
-        {},  # nothing to take
-        {"foods": [BEHIND]},  # not in view
-        {"queen": M},  # without food she looks O
-        {"carries": True, "foods": [M]},  # already carries
-        {"carries": True, "queen": M},  # Q shares its code with F
+        (PICK_UP, {}),  # nothing to take
+        (PICK_UP, {"foods": [BEHIND]}),  # not in view
+        (PICK_UP, {"queen": M}),  # without food she looks O
+        (PICK_UP, {"carries": True, "foods": [M]}),  # already carries
+        (PICK_UP, {"carries": True, "queen": M}),  # Q shares its code with F
+        (GIVE, {"carries": True}),  # no queen in view
+        (GIVE, {"carries": True, "queen": BEHIND}),
+        (GIVE, {"queen": M}),  # nothing to give
+        (GIVE, {"foods": [M]}),  # F shares its code with Q
     ],
 )
-def test_pick_up_fails(contents):
+def test_pick_up_and_give_fail(action, contents):
     scene = Scene(**contents)
     carries = scene.ant.carries
-    assert scene.act(PICK_UP) == (-1, Event.FAILED)
+    assert scene.act(action) == (-1, Event.FAILED)
     assert scene.ends == (A, 1, carries)
     assert scene.ant.stream.state == 0
     assert all(scene.world.content(cell) == FOOD for cell in contents.get("foods", []))
@@ -136,19 +140,3 @@ def test_give_pays_ten_and_keeps_the_heading(queen, state):
     assert scene.ends == (A, 1, False)
     assert scene.ant.paper_state == state  # the queen looks O again
     assert scene.world.trail.level(A) == 0
-
-
-@pytest.mark.parametrize(
-    "contents",
-    [
-        {"carries": True},  # no queen in view
-        {"carries": True, "queen": BEHIND},
-        {"queen": M},  # nothing to give
-        {"foods": [M]},  # F shares its code with Q
-    ],
-)
-def test_give_fails(contents):
-    scene = Scene(**contents)
-    carries = scene.ant.carries
-    assert scene.act(GIVE) == (-1, Event.FAILED)
-    assert scene.ends == (A, 1, carries)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from colonies import GAMMA, training
-from transitions import transition
+from transitions import transition, values_of
 
 from taichi_ants.reference import LEARNERS
 from taichi_ants.reference.choice import choose_action
@@ -29,12 +29,6 @@ def learn(learner, *steps, rng_state=0):
     errors = [learner.learn(step, 0.0, stream) for step in steps]
     assert all(type(error) is np.float32 for error in errors)
     return errors
-
-
-def values_of(learner):
-    """The values that are not zero, by state and action."""
-    table = learner.table()
-    return {(int(s), int(a)): float(table[s, a]) for s, a in np.argwhere(table)}
 
 
 def td_error(name, value, reward, discount, next_values, next_action=0, epsilon=0.0):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from colonies import GAMMA, act, begun, load, training
-from transitions import transition
+from transitions import transition, values_of
 
 from taichi_ants.learners.config import update_weights
 from taichi_ants.reference import LEARNERS
@@ -30,10 +30,6 @@ def streams(n, state=0):
     return [RandomStream(state) for _ in range(n)]
 
 
-def errors_of(colony):
-    return [step.td_error for step in colony.transitions]
-
-
 def table(**values):
     """A table of zeros but for values given as s<state>a<action>=value."""
     q_values = np.zeros((128, 5), np.float32)
@@ -41,12 +37,6 @@ def table(**values):
         state, action = name[1:].split("a")
         q_values[int(state), int(action)] = value
     return q_values
-
-
-def changed(learner):
-    """The values that are not zero, by state and action."""
-    q_values = learner.table()
-    return {(int(s), int(a)): float(q_values[s, a]) for s, a in np.argwhere(q_values)}
 
 
 def test_three_errors_of_one_pair_and_one_of_another():
@@ -63,7 +53,7 @@ def test_three_errors_of_one_pair_and_one_of_another():
     assert [step.td_error for step in steps] == [3, -2, -3, 8]
     mean = np.float32(8 / 3)
     value = np.float32(2) + np.float32(0.875) * mean
-    assert changed(learner) == {(0, 1): float(value), (5, 0): 3.0}
+    assert values_of(learner) == {(0, 1): float(value), (5, 0): 3.0}
 
 
 @pytest.mark.parametrize(
@@ -107,7 +97,7 @@ def test_sarsa_chooses_by_the_table_before_the_update(learner, then):
     q_values = table(s0a1=0.25, s0a0=0.1875)
     colony = begun(world, training(learner), "shared", q_values=q_values)
     act(colony, FORWARD, FORWARD)
-    assert errors_of(colony) == [-0.125, -0.125]
+    assert [step.td_error for step in colony.transitions] == [-0.125, -0.125]
     assert colony.q_values[0, FORWARD] == 0.15625
     drawn = then if learner == "sarsa" else None
     assert [step.next_action for step in colony.transitions] == [drawn] * 2
@@ -157,7 +147,7 @@ def test_a_round_of_planning_by_hand():
         steps = [transition(0, 1, 8, 5, number=k, terminated=True) for k in range(2)]
         learn(learner, steps, ants)
         assert [step.td_error for step in steps] == [8, 8]  # of the real transitions alone
-        assert changed(learner) == {(0, 1): value}
+        assert values_of(learner) == {(0, 1): value}
         assert [stream.state for stream in ants] == [rounds * GAMMA % 2**64] * 2
 
 

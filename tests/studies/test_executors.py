@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import re
 import signal
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -259,7 +260,7 @@ def test_few_blocks_are_in_flight():
             return future
 
     taken, executor = [], Slow()
-    works = completed((taken.append(n) or n for n in range(50)), lambda n: n, executor)
+    works = completed(range(50), lambda n: taken.append(n) or n, executor)
     next(works)
     assert len(taken) <= 4
     assert len(list(works)) == 49
@@ -267,9 +268,9 @@ def test_few_blocks_are_in_flight():
 
 
 def test_workers_of_another_version_are_refused():
-    said = rf"taichi_ants 0\.0\.1 \(physics {PHYSICS}\) and Python 3\.8, but a worker has"
-    with pytest.raises(AntsError, match=said):
-        run_pickled(("0.0.1", PHYSICS, "3.8"), (), pickle.dumps(None))
+    theirs = f"taichi_ants 0.0.1 (physics {PHYSICS}) and Python 3.8"
+    with pytest.raises(AntsError, match=f"{re.escape(theirs)}, but a worker has taichi_ants"):
+        run_pickled(theirs, (), pickle.dumps(None))
 
 
 def test_a_plugin_travels_as_text(monkeypatch):

@@ -68,19 +68,6 @@ def test_other_errors_in_callbacks_are_told(capsys):
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
-def test_what_is_held_is_done_first():
-    steps = []
-
-    def work():
-        with held():
-            signal.raise_signal(signal.SIGTERM)
-            steps.append("done")
-        steps.append("not reached")
-
-    assert stopped_by(signal.SIGTERM, work) == 143
-    assert steps == ["done"]
-
-
 def test_what_is_held_can_ask_whether_to_end(capsys):
     told = []
 

@@ -11,6 +11,7 @@ import pytest
 from taichi_ants import AntsError, Colony, TrainingConfig, evaluate, train
 from taichi_ants.protocol import At, Every
 from taichi_ants.studies import points as kinds_of_points
+from taichi_ants.studies.folder import provenance, source
 from taichi_ants.studies.points import (
     EVALUATION_SEEDS,
     ColonyPoint,
@@ -21,7 +22,6 @@ from taichi_ants.studies.points import (
     settings_of,
     world_facts,
 )
-from taichi_ants.studies.provenance import provenance, source
 from taichi_ants.studies.store import Store
 from taichi_ants.studies.study import Study, run, share_of
 from taichi_ants.task import Life, Rewards, Task

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from taichi_ants.reference.ants import Transition
 from taichi_ants.task.events import Event
 
@@ -22,3 +24,9 @@ def transition(
     return Transition(
         number=number, state=state, action=action, reward=reward, next_state=next_state, **facts
     )
+
+
+def values_of(learner):
+    """The values that are not zero, by state and action."""
+    table = learner.table()
+    return {(int(s), int(a)): float(table[s, a]) for s, a in np.argwhere(table)}

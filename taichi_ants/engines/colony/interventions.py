@@ -30,11 +30,7 @@ from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.errors import AntsError, as_array, count
-from taichi_ants.grid.constants import (
-    N_HEADINGS,
-    STREAM_BORN,
-    STREAM_INTERVENTION,
-)
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_INTERVENTION
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.interventions import Intervention, flat_indices
@@ -60,8 +56,8 @@ _GROUNDS = {"rock": OBSTACLE, "food": FOOD}
 class _World:
     """One world of a colony with interventions; its slots, cells and arrays are of this world.
 
-    The methods up to `trail` have the names of interventions. A method that returns a `Change`
-    yields once, between its checks and its effects.
+    The first methods have the names of interventions, see the classes with these paths. A method
+    that returns a `Change` yields once, between its checks and its effects.
     """
 
     def __init__(self, interventions: Interventions, w: int) -> None:
@@ -70,29 +66,22 @@ class _World:
         self.queen_cells = self.colony.queen_cells[w]  # a view, (nests,)
 
     def place(self, change: language.Place) -> Change:
-        """Place rock or food, see `_put`, or move a queen to a cell without rock or food."""
         cells, foods = self._index(change.cells), list(self.colony.task.foods)
         if change.what != "queen":
             kind = foods.index(change.kind) if change.kind else 0
             return self._put(cells, _GROUNDS[change.what], kind)
         if not self._can_be_free(cells[0]):
+            cell = tuple(self.colony.grid.cells(cells[0]).tolist())
             raise AntsError(
-                "the queen cannot move to cell "
-                f"{tuple(self.colony.grid.cells(cells[0]).tolist())}, because it is not empty; "
-                "choose an empty cell."
+                f"the queen cannot move to cell {cell}, because it is not empty; choose another."
             )
         nest = change.nest or 0
         return self._carry(self.queen_cells[nest], cells[0], QUEEN, nest)
 
     def clear(self, change: language.Clear) -> Change:
-        """Remove rock and food."""
         return self._put(self._index(change.cells), EMPTY)
 
     def move(self, change: language.Move) -> Change:
-        """Move the rock, the food or the queen of a cell to another; an ant there moves aside.
-
-        Has no effect if the first cell has none of them, or the other one is not free.
-        """
         cell, to = flat_indices(self.colony.grid, change.cells)
         what, number, loads = int(self.view("ground")[cell]), 0, None
         if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
@@ -107,7 +96,6 @@ class _World:
         yield from self._carry(cell, to, what, number, loads)
 
     def trail(self, change: language.SetTrail) -> Change:
-        """Set the trail, or a further field, of cells other than rocks."""
         everywhere = np.flatnonzero(self.colony.grid.exists)
         cells = everywhere if change.cells is None else self._index(change.cells)
         number = [TRAIL, *self.colony.task.fields].index(change.field)
@@ -115,7 +103,6 @@ class _World:
         self._lay(cells[self.view("walls")[cells] == 0], change.level, number)
 
     def add_ants(self, change: language.AddAnts) -> Change:
-        """Put newborn ants on free start cells, or on those of the cells given that are empty."""
         if change.cells is None:
             return self._add_some(self._amount(change), change.nest)
         cells = self._index(change.cells)
@@ -126,18 +113,17 @@ class _World:
         return self._add(cells, nests)
 
     def remove_ants(self, change: language.RemoveAnts) -> Change:
-        """Remove random ants, or those on cells, with the food that they carry."""
         slots = self._living_slots(change.nest)
         cells = None if change.cells is None else self._index(change.cells)
         yield
         if cells is None:
             words = self.all.stream(self.w).bits(len(slots))
-            self._remove(slots[np.argsort(words, kind="stable")[: self._amount(change)]])
+            slots = slots[np.argsort(words, kind="stable")[: self._amount(change)]]
         else:
-            self._remove(slots[np.isin(self.view("cell")[slots], cells)])
+            slots = slots[np.isin(self.view("cell")[slots], cells)]
+        self._remove(slots)
 
     def ants(self, change: language.SetAnts) -> Change:
-        """Set the number of ants; new ants take free cells in the order of `World.start`."""
         living = self._living_slots()
         if self.all.lasting:
             self._check_room(self.all.starts[self.w], change.number)
@@ -161,9 +147,7 @@ class _World:
         self._step_aside(ants, to)
         self._fill(there, what, kind)
 
-    def _carry(
-        self, cell: int, to: int, what: int, number: int, loads: int | None = None
-    ) -> Change:
+    def _carry(self, cell: int, to: int, what: int, number: int, loads: Any = None) -> Change:
         """Move what is in a cell to another one; see `_fill`."""
         yield from self._start_with([cell, to], [EMPTY, what | number << _NUMBER])
         self._step_aside(*self._aside(np.array([to])))
@@ -239,9 +223,7 @@ class _World:
                 f"{count(int(room), 'free cell')}; leave more cells free, or choose fewer ants."
             )
 
-    def _fill(
-        self, cells: np.ndarray, what: int, number: int = 0, loads: int | None = None
-    ) -> None:
+    def _fill(self, cells: np.ndarray, what: int, number: int = 0, loads: Any = None) -> None:
         """Make cells without ants EMPTY, OBSTACLE or FOOD, by default with all loads, or one QUEEN.
 
         `number` is the kind of the food, or the nest of the queen. See `food_sources.changed`.
@@ -386,9 +368,8 @@ class Interventions:
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None
         n = len(colony.worlds)
-        numbers = as_array(
-            "worlds", range(n) if worlds is None else worlds, "iu", (None,), 0, n - 1
-        )
+        given = range(n) if worlds is None else worlds
+        numbers = as_array("worlds", given, "iu", (None,), 0, n - 1)
         self.worlds = tuple(dict.fromkeys(numbers.tolist()))
         self._first = colony.worlds
         self.starts = [_start_of(world) for world in colony.worlds] if lasting else []
@@ -460,13 +441,18 @@ class Interventions:
 
     def state(self) -> str:
         """Return a hash of the whole state; colonies with equal hashes behave identically."""
-        colony = self.colony
-        moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
-        streams = [self.stream(w).state for w in self.worlds]
-        rest = (self.ants, streams, colony.task.as_dict(), colony.training.as_dict())
+        colony, streams = self.colony, [self.stream(w).state for w in self.worlds]
+        rest: Any = [
+            colony.epsilon,
+            colony.learning_rate,
+            colony.length,
+            colony.ticks,
+            colony.ants,
+        ]
+        rest += [self.ants, streams, colony.task.as_dict(), colony.training.as_dict()]
         arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer")}
         arrays |= {f"start {w}": start for w, start in enumerate(self.starts)}
-        digest = hashlib.sha256(files.to_json([*moment, *rest]).encode())
+        digest = hashlib.sha256(files.to_json(rest).encode())
         for name, array in sorted(arrays.items()):
             digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
             digest.update(np.ascontiguousarray(array).data)

@@ -15,16 +15,9 @@ import taichi as ti
 from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
-from taichi_ants.engines.colony import columns, learning, life, own_inputs, steps, trail
+from taichi_ants.engines.colony import columns, layout, learning, life, own_inputs, steps, trail
 from taichi_ants.engines.colony.columns import function
-from taichi_ants.engines.colony.layout import (
-    GAVE_UP,
-    Barrier,
-    Order,
-    Stage,
-    WorldRow,
-    array_of,
-)
+from taichi_ants.engines.colony.layout import Barrier, Order, WorldRow
 from taichi_ants.engines.colony.views import entries_of
 from taichi_ants.features import hooks_at
 from taichi_ants.learners.memory import guarded, read_rates
@@ -55,7 +48,6 @@ class Variant:
         self.mark_of_rest = STANDS if model.traffic.shared else 0
         # The hooks of features at each point, in their order.
         self.at = hooks_at(model.features)
-        self.can_rest = bool(self.at["rests"])
         self.entries = entries_of(model)
         own = own_inputs.own_rules(model.rules)
         self.draw_by_cues = steps.draw_cell if model.choice == "deneubourg" else None
@@ -79,15 +71,13 @@ class Variant:
 
     def field(self, c: Any, number: int) -> trail.PheromoneArrays:
         """Return the arrays and numbers of a pheromone; 0 is the trail."""
-        (dense, view, deposit, evaporation), end = (
-            self.pheromones[number],
-            f"_{number}" * (number > 0),
-        )
+        dense, view, deposit, evaporation = self.pheromones[number]
+        end = f"_{number}" if number else ""
         return trail.PheromoneArrays(
             dense,
             view == "half",
             view == "strongest_under_carriers",
-            getattr(c, array_of(number, dense)),
+            getattr(c, layout.array_of(number, dense)),
             getattr(c, f"spare{end}") if dense else None,
             *(getattr(c, name + end) for name in trail.NUMBERS),
             deposited_when=getattr(c, f"deposited_when{end}") if number else None,
@@ -98,10 +88,6 @@ class Variant:
     def dense_fields(self, c: Any) -> list[trail.PheromoneArrays]:
         """Return the arrays and numbers of the dense pheromones."""
         return [self.field(c, number) for number, dense in enumerate(self.dense_by_number) if dense]
-
-    def further_fields(self, c: Any) -> list[trail.PheromoneArrays]:
-        """Return the arrays and numbers of the pheromones other than the trail."""
-        return [self.field(c, number) for number in range(1, len(self.pheromones))]
 
 
 variant = cache(Variant)
@@ -174,7 +160,7 @@ def is_taken(c, v, ant):
     """Return whether an ant is in a slot; without vacant slots, always, while a kernel compiles."""
     taken = True
     if ti.static(v.slots_matter):
-        taken = columns.trait(c.stage, ant) != Stage.VACANT
+        taken = columns.trait(c.stage, ant) != layout.Stage.VACANT
     return taken
 
 
@@ -228,7 +214,7 @@ def wait_for_all(c, part, parts, number):
             spins += 1
         goes_on = ti.cast(arrived >= wanted, ti.i32)
         ti.atomic_add(
-            c.barrier[Barrier.OPENED], ti.select(goes_on == 1, ti.i64(1), ti.i64(GAVE_UP))
+            c.barrier[Barrier.OPENED], ti.select(goes_on == 1, ti.i64(1), ti.i64(layout.GAVE_UP))
         )
     else:
         ti.atomic_add(c.barrier[Barrier.ARRIVED], 1)
@@ -237,7 +223,7 @@ def wait_for_all(c, part, parts, number):
             opened = ti.atomic_add(c.barrier[Barrier.OPENED], 0)
         # The first part may have opened this barrier, and given up at the next one since then.
         if opened < 0:
-            opened -= ti.i64(GAVE_UP)
+            opened -= ti.i64(layout.GAVE_UP)
         goes_on = ti.cast(opened > number, ti.i32)
     return goes_on
 

@@ -99,7 +99,7 @@ def observe_and_learn(c, v, w, chunk, ant, tick):
     if lives:
         c.wants[marked] = 0
     note_seen(c, v, ant, paper_state, state)
-    if ti.static(v.can_rest):
+    if ti.static(v.at["rests"]):
         next_action = ti.select(stops, -1, next_action)
         rest(c, v, w, ant, acts, stops)
     if ti.static(v.draws_next_action):
@@ -210,12 +210,8 @@ def error_of(c, v, w, pair, reward, terminated, seen, next_action):
     table = steps.table_of(c, v, w * v.n_groups + group_of_pair(v, pair))
     value, rates = place_in_tables(c, v, w, pair), rates_of(c, v, caste_of_pair(v, pair))
     error = v.td_error(
-        c.q[value],
-        reward,
-        discount_of(rates, terminated),
-        values_of(c.q, table, seen),
-        next_action,
-        rates.epsilon,
+        *(c.q[value], reward, discount_of(rates, terminated)),
+        *(values_of(c.q, table, seen), next_action, rates.epsilon),
     )
     if not ti.abs(error) < c.largest_error:
         c.q[value] = ti.math.nan  # a fixed-point sum would hide such an error
@@ -390,7 +386,7 @@ def weight_of(c, v, pair, count):
 def draw_pair(c, v, w, chunk, ant, tick):
     """Draw a visited pair for a planning update of an ant."""
     acted = columns.trait(c.stage, ant) != Stage.NEWBORN
-    if ti.static(v.can_rest):
+    if ti.static(v.at["rests"]):
         acted = acted & (columns.trait(c.event, ant) != Event.NONE)
     if acted & learns(c, v, ant):
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))

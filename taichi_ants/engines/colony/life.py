@@ -8,20 +8,9 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below, high_word, stream_of
+from taichi_ants.engines.colony import layout
 from taichi_ants.engines.colony.columns import function, put, trait
-from taichi_ants.engines.colony.layout import (
-    ANT_GROUND,
-    ANT_STANDS,
-    NESTS_BY_KINDS,
-    TALLY_WIDTH,
-    TOTALS,
-    FoodRow,
-    FoodSourceRow,
-    NestRow,
-    Stage,
-    Tally,
-    WorldRow,
-)
+from taichi_ants.engines.colony.layout import FoodSourceRow, NestRow, Stage, Tally, WorldRow
 from taichi_ants.engines.colony.learning import reset_slot
 from taichi_ants.engines.colony.steps import tally
 from taichi_ants.engines.colony.views import ant_view, nest_view
@@ -37,9 +26,9 @@ def count(c, v, w, tick):
     # No `+=`, which would be atomic and slower: one thread processes a world.
     gives = 0
     for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
-        first = chunk * TALLY_WIDTH
+        first = chunk * layout.TALLY_WIDTH
         gives += ti.cast(c.tallies[first + Tally.DELIVERIES], ti.i32)
-        for row in ti.static(TOTALS):
+        for row in ti.static(layout.TOTALS):
             c.totals[row, w] = c.totals[row, w] + c.tallies[first + row]
         if ti.static(v.ants_change):
             deaths = ti.cast(c.tallies[first + Tally.DEATHS], ti.i32)
@@ -68,8 +57,8 @@ def count_by_nest(c, v, w):
         for kind in ti.static(range(v.n_kinds)):
             i, n = ti.static(nest * v.n_kinds + kind), 0
             for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
-                n += c.delivered[chunk * NESTS_BY_KINDS + i]
-                c.delivered[chunk * NESTS_BY_KINDS + i] = 0
+                n += c.delivered[chunk * layout.NESTS_BY_KINDS + i]
+                c.delivered[chunk * layout.NESTS_BY_KINDS + i] = 0
             c.deliveries_by_nest_and_kind[column * v.n_kinds + kind] += n
             of_nest += n
         c.nests[NestRow.STORE, column] += of_nest * c.births
@@ -155,10 +144,10 @@ def place_newborn(c, v, w, nest, ant, cell, heading):
     c.number[ant] = number
     born = ti.cast(c.episodes[w], ti.u64) << ti.u64(32) | ti.cast(number, ti.u64)
     c.streams[ant] = stream_of(c.seeds[w], STREAM_BORN, born)
-    ground = ANT_GROUND
+    ground = layout.ANT_GROUND
     if ti.static(v.n_nests > 1):
         put(c.nest, ant, nest)
-        ground = OBSTACLE | (ANT_STANDS - nest) << 4
+        ground = OBSTACLE | (layout.ANT_STANDS - nest) << 4
     for born in ti.static(v.at["born"]):
         born(ant_view(c, v, w, ant))
     c.ground[w * c.size + cell] = ti.cast(ground, ti.u8)
@@ -197,14 +186,14 @@ def regrow(c, v, w, tick):
         if ti.static(v.n_kinds > 1):
             kind = c.food_sources[FoodSourceRow.KIND, source]
         if ti.static(v.has_foods):
-            waits = c.food_numbers[FoodRow.REGROWTH, kind]
+            waits = c.food_numbers[layout.FoodRow.REGROWTH, kind]
         index = place_of(c, w, source)
         if waits >= 0 and taken >= 0 and tick >= taken + waits and c.ground[index] == EMPTY:
             grown = 1
             if ti.static(v.n_kinds > 1):
                 c.kind_of[index] = ti.cast(kind, ti.u8)
             if ti.static(v.has_loads):
-                grown = c.food_numbers[FoodRow.LOADS, kind]
+                grown = c.food_numbers[layout.FoodRow.LOADS, kind]
                 c.loads[index] = grown
             c.ground[index] = FOOD
             c.source_of[index] = source

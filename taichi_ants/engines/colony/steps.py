@@ -20,53 +20,17 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below
-from taichi_ants.engines.colony.columns import (
-    function,
-    group_of,
-    individual,
-    nest_of,
-    of_caste,
-    put,
-    trait,
-)
-from taichi_ants.engines.colony.layout import (
-    ANT_GROUND,
-    ANT_STANDS,
-    NESTS_BY_KINDS,
-    TALLY_WIDTH,
-    CasteRow,
-    FoodRow,
-    FoodSourceRow,
-    NestRow,
-    Tally,
-)
-from taichi_ants.engines.colony.trail import (
-    deposit,
-    lay,
-    level_in_view,
-    level_of,
-    level_that_counts,
-    occasions_of,
-)
+from taichi_ants.engines.colony import columns, layout, trail
+from taichi_ants.engines.colony.columns import function, nest_of, of_caste, put, trait
+from taichi_ants.engines.colony.layout import ANT_GROUND, ANT_STANDS, TALLY_WIDTH, CasteRow, Tally
+from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
 from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.engines.views import fill_codes
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.memory import values_of
-from taichi_ants.task.constants import (
-    BEST_AT,
-    EMPTY,
-    FORWARD,
-    GIVE,
-    LEFT,
-    MAX_CASTES,
-    OBSTACLE,
-    PICK_UP,
-    QUEEN,
-    RIGHT,
-    ROW,
-    SEES_CUE,
-)
+from taichi_ants.task import constants
+from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, RIGHT
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import OCCASIONS
 from taichi_ants.task.rules import actions, conflicts, delivery, noise, policy, vision
@@ -144,10 +108,7 @@ def see(c, v, cues, w, ant, tick):
         else:
             homing = ti.static(v.field(c, cues.followed))
             paper_state = vision.paper_state_homing(
-                homing.half,
-                ground_left,
-                ground_forward,
-                ground_right,
+                *(homing.half, ground_left, ground_forward, ground_right),
                 level_in_view(c, homing, left, tick),
                 level_in_view(c, homing, forward, tick),
                 level_in_view(c, homing, right, tick),
@@ -156,10 +117,7 @@ def see(c, v, cues, w, ant, tick):
     else:
         outbound = ti.static(v.field(c, cues.outbound))
         paper_state = vision.paper_state_foraging(
-            cues.half,
-            ground_left,
-            ground_forward,
-            ground_right,
+            *(cues.half, ground_left, ground_forward, ground_right),
             level_in_view(c, outbound, left, tick),
             level_in_view(c, outbound, forward, tick),
             level_in_view(c, outbound, right, tick),
@@ -267,7 +225,7 @@ def looks_of(c, v, index, queen):
     """
     ground = ti.cast(c.ground[index] & 15, ti.i32)
     if ti.static(v.n_nests > 1):
-        ground = ti.select((ground == QUEEN) & (index != queen), OBSTACLE, ground)
+        ground = ti.select((ground == constants.QUEEN) & (index != queen), OBSTACLE, ground)
     return ground
 
 
@@ -287,7 +245,7 @@ def own_queen(c, v, w, ant):
     queen = -1
     if ti.static(v.n_nests > 1):
         column = w * v.n_nests + nest_of(c, v, ant)
-        queen = w * c.size + c.nests[NestRow.QUEEN_CELL, column]
+        queen = w * c.size + c.nests[layout.NestRow.QUEEN_CELL, column]
     return queen
 
 
@@ -306,7 +264,7 @@ def table_of(c, v, owner):
 @function
 def owner_of(c, v, w, ant):
     """Return the owner of the table by which an ant chooses: its slot, or its world and group."""
-    return ant if ti.static(v.own_tables) else w * v.n_groups + group_of(c, v, ant)
+    return ant if ti.static(v.own_tables) else w * v.n_groups + columns.group_of(c, v, ant)
 
 
 @function
@@ -343,7 +301,7 @@ def best_actions_of(c, v, table, state):
     if ti.static(v.independent):
         best = policy.best_actions(values_of(c.q, table, state))
     else:
-        best = ti.cast(c.q[table + state * ROW + BEST_AT], ti.i32)
+        best = ti.cast(c.q[table + state * constants.ROW + constants.BEST_AT], ti.i32)
     return best
 
 
@@ -374,7 +332,7 @@ def cell_ahead(c, v, cues, w, ant, state, paper_state, i: ti.template()):
     code = vision.code_in_view(state, i)
     is_true = code == vision.code_in_view(paper_state, i)
     opens = ti.cast(actions.is_open(code), ti.i32)
-    nears = ti.cast(code == SEES_CUE, ti.i32) & ti.static(int(cues.has_compass))
+    nears = ti.cast(code == constants.SEES_CUE, ti.i32) & ti.static(int(cues.has_compass))
     index = w * c.size + c.cell[ant] + actions.step_towards(c.compass, heading, i)
     if is_true & (c.ground[index] >> 4 != 0):  # an ant stands there
         nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
@@ -394,7 +352,7 @@ def explore_below_of(c, v, w, ant):
         if of_own_caste >= 0.0:
             if ti.static(v.epsilon_varies):
                 spread = of_caste(c, ant, CasteRow.EPSILON_SPREAD)
-                of_own_caste += spread * (2.0 * individual(c, w, ant) - 1.0)
+                of_own_caste += spread * (2.0 * columns.individual(c, w, ant) - 1.0)
             bound = ti.cast(of_own_caste * 4294967296.0, ti.u64)
     return bound
 
@@ -460,7 +418,7 @@ def want(c, v, w, chunk, ant, tick):
     for choose in ti.static(v.at["choose"]):
         rests, random_state = choose(ant_view(c, v, w, ant), random_state)
         if rests == 1:  # without food, this action does nothing; `observe_and_learn` removes it
-            resting, action = 1, GIVE
+            resting, action = 1, constants.GIVE
     if action < 0:
         random_state = advance(random_state)
         state = state_index_of(c, v, ant)
@@ -479,7 +437,7 @@ def want(c, v, w, chunk, ant, tick):
     wanted = cell + enters * step
     mark = v.mark_of_rest + enters * (conflicts.ENTER + heading - v.mark_of_rest)
     foods = vision.goals_in_view(paper_state) * (1 - carries)  # no branch by `carries`
-    if (foods != 0) & (action == PICK_UP):
+    if (foods != 0) & (action == constants.PICK_UP):
         position = policy.lowest_bit_number(foods)
         if foods & (foods - 1) != 0:  # several food items in view
             k, random_state = draw_below(random_state, popcnt(foods))
@@ -566,7 +524,7 @@ def is_stronger(field, index, from_index, tick):
 def act(c, v, w, chunk, ant, tick):
     """Do the action of an ant: move or pick up if it has won, or deliver; and deposit."""
     base = w * c.size
-    trail = ti.static(v.field(c, 0))
+    first = ti.static(v.field(c, 0))
     action, paper_state = executed_by(c, v, ant), trait(c.paper_state, ant)
     cell, wanted = c.cell[ant], c.want[ant]
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
@@ -596,7 +554,7 @@ def act(c, v, w, chunk, ant, tick):
             if ti.static(not v.lays_in_turn):
                 if lays(c, v, ant, 0):
                     index = base + goes
-                    deposit(c, v, trail, w, ant, index, tick, carried, carries, event, paper_state)
+                    deposit(c, v, first, w, ant, index, tick, carried, carries, event, paper_state)
         elif delivery.can_give(action, paper_state):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
@@ -614,20 +572,19 @@ def act(c, v, w, chunk, ant, tick):
         take_load(c, v, ant, base + wanted, tick)
         if ti.static(not v.lays_in_turn):
             if lays(c, v, ant, 0):
-                deposit(c, v, trail, w, ant, base + wanted, tick, 0, carries, event, paper_state)
-                deposit(c, v, trail, w, ant, base + cell, tick, 0, carries, event, paper_state)
+                deposit(c, v, first, w, ant, base + wanted, tick, 0, carries, event, paper_state)
+                deposit(c, v, first, w, ant, base + cell, tick, 0, carries, event, paper_state)
         put(c.heading, ant, actions.turn_round(heading))
     if ti.static(len(v.pheromones) > 1):
         age = ti.select(carries == had_food, age, 0)
-        occasions = occasions_of(had_food, paper_state, action, event, goes != cell)
+        occasions = trail.occasions_of(had_food, paper_state, action, event, goes != cell)
         for rests in ti.static(v.at["rests"]):
             occasions *= 1 - rests(ant_view(c, v, w, ant))
-        fields = ti.static([] if v.lays_in_turn else v.further_fields(c))
-        for i in ti.static(range(len(fields))):
-            if lays(c, v, ant, i + 1):
-                field = ti.static(fields[i])
+        for i in ti.static(range(1, 1 if v.lays_in_turn else len(v.pheromones))):
+            if lays(c, v, ant, i):
+                field = ti.static(v.field(c, i))
                 laid = field.deposited_when & occasions  # a single one, see `Field.deposited_when`
-                lay(
+                trail.lay(
                     *(c, v, field, w, ant, laid, cell, goes, wanted, tick, age),
                     *(carries, event, paper_state),
                 )
@@ -654,13 +611,12 @@ def lays_field(number: int) -> Callable[..., None]:
     @function
     def lay_apart(c, v, w, chunk, ant, tick):
         cell, goes, carries = c.want[ant], c.cell[ant], trait(c.carries, ant)
-        event, paper_state, had_food = trait(c.event, ant), trait(c.paper_state, ant), carries
-        if event == Event.PICKED_UP:
-            had_food = 0
-        if event == Event.DELIVERED:
-            had_food = 1
+        event, paper_state = trait(c.event, ant), trait(c.paper_state, ant)
+        changed = (event == Event.PICKED_UP) | (event == Event.DELIVERED)
+        had_food = ti.select(changed, 1 - carries, carries)
         age = ti.select(carries == had_food, c.carried[ant] - 1, 0)
-        occasions = occasions_of(had_food, paper_state, executed_by(c, v, ant), event, goes != cell)
+        action = executed_by(c, v, ant)
+        occasions = trail.occasions_of(had_food, paper_state, action, event, goes != cell)
         for rests in ti.static(v.at["rests"]):
             occasions *= 1 - rests(ant_view(c, v, w, ant))
         food = cell + c.compass[conflicts.heading_taken(c, w * c.size + cell) + 1]
@@ -669,7 +625,7 @@ def lays_field(number: int) -> Callable[..., None]:
         if ti.static(number > 0):
             laid = occasions & field.deposited_when
         if lays(c, v, ant, number):
-            lay(
+            trail.lay(
                 *(c, v, field, w, ant, laid, cell, goes, food, tick, age),
                 *(carries, event, paper_state),
             )
@@ -696,12 +652,12 @@ def tally(c, state, chunk, n):
 def count_apart(c, v, ant, chunk):
     """Count a delivery by nest and kind of food, if there are several, and by caste."""
     if ti.static(v.counts_by_nest_and_kind):
-        column = chunk * NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
+        column = chunk * layout.NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
         if ti.static(v.n_kinds > 1):
             column += trait(c.kind, ant)
         c.delivered[column] = c.delivered[column] + 1
     if ti.static(v.n_castes > 0):
-        column = chunk * MAX_CASTES + trait(c.caste, ant)
+        column = chunk * constants.MAX_CASTES + trait(c.caste, ant)
         c.delivered_by_caste[column] = c.delivered_by_caste[column] + 1
 
 
@@ -726,9 +682,9 @@ def event_reward(c, v, ant):
             kind = 0
             if ti.static(v.n_kinds > 1):
                 kind = trait(c.kind, ant)
-            reward = c.food_numbers[FoodRow.PICK_UP, kind]
+            reward = c.food_numbers[layout.FoodRow.PICK_UP, kind]
             if event == Event.DELIVERED:
-                reward = c.food_numbers[FoodRow.DELIVER, kind]
+                reward = c.food_numbers[layout.FoodRow.DELIVER, kind]
     return reward
 
 
@@ -752,5 +708,5 @@ def take_from_source(c, index, tick):
     if c.n_food_sources > 0:
         source = c.source_of[index]
         if source >= 0:
-            c.food_sources[FoodSourceRow.TAKEN, source] = tick
+            c.food_sources[layout.FoodSourceRow.TAKEN, source] = tick
             c.source_of[index] = -1

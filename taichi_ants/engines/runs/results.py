@@ -129,7 +129,7 @@ class Rollouts(Record, Tidy):
     returns: np.ndarray
     steps: np.ndarray
     deliveries: np.ndarray
-    seeds: tuple[int, ...] = field(default=(), compare=False, repr=False)
+    seeds: tuple[int, ...] = field(compare=False, repr=False)
 
     def measured(self) -> Measured:
         """Return the values of the measures of each rollout; `configuration` numbers the tables.
@@ -139,9 +139,9 @@ class Rollouts(Record, Tidy):
         rollouts, leading = self.returns.shape[-1], self.returns.shape[:-1]
         shape = (-1, leading[-1] if leading else 1, rollouts)
         arrays = {name: getattr(self, name).reshape(shape) for name in OUTCOMES}
-        n, several = arrays["returns"].shape[:2]
+        n = len(arrays["returns"])
         names = ("",) if n == 1 else tuple(f"table {number}" for number in range(n))
-        return _measured(arrays, self.seeds or tuple(range(several)), names)
+        return _measured(arrays, self.seeds, names)
 
 
 @dataclass(frozen=True, eq=False)

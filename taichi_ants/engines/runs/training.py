@@ -5,7 +5,6 @@ Traces come from the same kernel as training and evaluation, compiled to record 
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, replace
 from functools import partial
@@ -91,13 +90,12 @@ def continue_training(
     arguments.checked_configs(result.configs)
     state = result.state
     given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
-    for config in result.configs:
-        needed = astuple(memory_for([config], result.task.n_states))
-        if not all(map(operator.ge, given, needed)):  # kernels would write outside of it
-            raise AntsError(
-                f"learner {config.learner!r} needs more memory than when this training started; "
-                "train again from the first episode."
-            )
+    needed = astuple(memory_for(result.configs, result.task.n_states))
+    if np.less(given, needed).any():  # kernels would write outside of it
+        raise AntsError(
+            "a learner needs more memory than when this training started; train again from the "
+            "first episode."
+        )
     copies = RunState(**{name: array.copy() for name, array in vars(state).items()})
     return _train(replace(result, state=copies), episodes, threads, arch, progress)
 
@@ -125,9 +123,10 @@ def _train(
         part = progress and partial(_report, progress, where, len(configs))
         seconds += runs.do_episodes(into, part)
         check_finite(runs.state.q, chosen, seeds)
-    joined: dict[str, Any] = dict(zip(OUTCOMES, outcomes, strict=True))
-    if result.episodes:
-        joined = {n: np.concatenate([getattr(result, n), a], axis=2) for n, a in joined.items()}
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(result, name), array], axis=2)
+        for name, array in zip(OUTCOMES, outcomes, strict=True)
+    }
     return replace(result, **joined, seconds=seconds)
 
 

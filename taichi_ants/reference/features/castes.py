@@ -24,13 +24,12 @@ def parts_of(castes: Sequence[Caste], nest: int) -> list[tuple[int, float]]:
     taken = sum([caste.share for caste in of_nest if caste.share is not None])
     neither = [caste for caste in of_nest if caste.share is None and caste.ants is None]
     rest = max(1.0 - taken, 0.0) / max(len(neither), 1)
-    shares = [rest if caste.share is None else caste.share for caste in castes]
-    return [
-        (0, 0.0)
-        if caste.nest not in (None, nest)
-        else ((0, share) if caste.ants is None else (caste.ants, 0.0))
-        for caste, share in zip(castes, shares, strict=True)
-    ]
+    parts: list[tuple[int, float]] = []
+    for caste in castes:
+        share = rest if caste.share is None else caste.share
+        part = (0, share) if caste.ants is None else (caste.ants, 0.0)
+        parts.append(part if caste.nest in (None, nest) else (0, 0.0))
+    return parts
 
 
 def castes_at_start(castes: Sequence[Caste], nest: int, n: int) -> list[int]:

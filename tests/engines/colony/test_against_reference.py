@@ -14,7 +14,7 @@ from same_colonies import assert_equal, every_tick
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, learners, worlds
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, cells_in_view
+from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, cells_in_view
 from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import registry
@@ -55,6 +55,14 @@ KERNELS = [
 ]  # fmt: skip
 
 
+def of_kernel(
+    seed: int, learner, sharing, observation, dense, traffic="blocking", view="half", **rules
+) -> RandomColony:
+    """A random colony with a learner, sharing and further rules, mostly with births or deaths."""
+    models = {"learner": learner, "sharing": sharing, "observation": observation, "dense": dense}
+    return random_colony(seed, traffic=traffic, view=view, **{"changes": True} | models | rules)
+
+
 def both(drawn: RandomColony) -> tuple[Colony, ReferenceColony]:
     return Colony(*drawn.model, **drawn.options), ReferenceColony(*drawn.model, **drawn.options)
 
@@ -83,22 +91,13 @@ def marked(kernels: list, quick: tuple[int, ...], long: tuple[int, ...]) -> list
 @pytest.mark.parametrize("kernel", marked(KERNELS, QUICK, LONG), ids=str)
 def test_every_tick_in_crowded_micro_worlds(kernel):
     """Two episodes each: something goes on between them, in every other case in another world."""
-    learner, sharing, observation, dense, *rules = kernel
+    observation, (*parts, rules) = kernel[2], kernel if len(kernel) > 6 else (*kernel, {})
     seen = np.zeros(5, dtype=int)
     later = KERNELS.index(kernel) not in QUICK
     is_large = observations.get(observation).n_states >= 1000
     for seed in range(8 if is_large else 12 if later else 20):
-        drawn = random_colony(
-            seed,
-            sharing=sharing,
-            rewards=random_rewards(seed),
-            learner=learner,
-            observation=observation,
-            dense=dense,
-            **(rules[2] if len(rules) > 2 else {}),
-            **dict(zip(("traffic", "view"), rules, strict=False)),
-            changes=kernel is not KERNELS[0],
-        )
+        rewards, changes = random_rewards(seed), kernel is not KERNELS[0]
+        drawn = of_kernel(seed, *parts, rewards=rewards, changes=changes, **rules)
         colony, plain = both(drawn)
         for _ in every_tick(
             colony, plain, (11, None), (8, without_rocks(drawn.world) if seed % 2 else None)
@@ -134,19 +133,10 @@ def with_strangers(view):
 @pytest.mark.parametrize("kernel", marked(NESTS, (0, 3), (2,)), ids=str)
 def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers):
     """Deliveries by nest and kind, loads, regrowth, births by nest: two episodes each."""
-    learner, sharing, observation, dense, traffic, view, nests, kinds, loads = kernel
-    seen = np.zeros(5, dtype=int)
+    learner, sharing, observation, *rules, nests, kinds, loads = kernel
+    seen, simple = np.zeros(5, dtype=int), observation.replace("other_nest_ants", "paper")
     for seed in range(24):
-        drawn = random_colony(
-            seed,
-            sharing=sharing,
-            learner=learner,
-            observation="paper" if observation == "other_nest_ants" else observation,
-            dense=dense,
-            traffic=traffic,
-            view=view,
-            changes=True,
-        )
+        drawn = of_kernel(seed, learner, sharing, simple, *rules)
         drawn = with_nests(drawn, seed, nests, kinds, loads)
         if observation == "other_nest_ants":
             table = np.random.default_rng(seed).random((54, 5)).astype(np.float32)
@@ -178,21 +168,11 @@ CASTES = [
 @pytest.mark.parametrize("kernel", marked(CASTES, (0, 2), (1, 3)), ids=str)
 def test_every_tick_with_castes_and_division_of_labour(kernel):
     """Numbers, tables, cues and deposits of castes, births, thresholds and idle ants."""
-    learner, sharing, observation, dense, traffic, view, castes, labour, nests, more = kernel
+    *parts, castes, labour, nests, more = kernel
     seen, cues = np.zeros(6, dtype=int), more.get("cues_of")
     rules = {name: one for name, one in more.items() if name != "cues_of"}
     for seed in range(18):
-        drawn = random_colony(
-            seed,
-            sharing=sharing,
-            learner=learner,
-            observation=observation,
-            dense=dense,
-            traffic=traffic,
-            view=view,
-            changes=True,
-            **rules,
-        )
+        drawn = of_kernel(seed, *parts, **rules)
         if nests > 1:
             drawn = with_nests(drawn, seed, nests, 1, loads=False)
         drawn = drawn_castes(drawn, seed, castes, labour, cues)
@@ -238,7 +218,6 @@ def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
     """Drawn colonies whose ants observe two fields, in every tick."""
     monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
     monkeypatch.setitem(OBSERVATIONS, "levels", levels_seen)
-    monkeypatch.setitem(TURNS, "levels", AHEAD)
     observations.register(Observation("levels", 128, with_levels, reads=("a", "B")))
     hidden = shown = 0
     for seed in range(12):

@@ -160,9 +160,16 @@ def test_runs_with_a_protocol_do_not_depend_on_other_worlds_or_the_schedule():
                 assert np.array_equal(array[:, 0], getattr(every, name)[:, seed]), name
         given = (worlds.paper(), FORAGING, FOLLOWS, seed, 20)
         plain = ReferenceColony(*given, sharing="frozen", q_values=trail_follower("ants"))
-        records = Protocol(plain, PROTOCOL).run(2, 160)
+        twin = Protocol(plain, PROTOCOL)
+        for _ in range(2):
+            twin.begin_episode()
+            for tick in range(160):
+                twin.before_tick()
+                plain.tick(last=tick == 159)
+            twin.end_episode()
         for name in ("deliveries", "first_delivery", "moves", "blocked"):
-            assert [getattr(one, name) for one in records] == getattr(alone, name)[:, 0].tolist()
+            counts = [getattr(one, name) for one in plain.records]
+            assert counts == getattr(alone, name)[:, 0].tolist()
 
 
 def test_a_run_leaves_no_trace_of_its_protocol():

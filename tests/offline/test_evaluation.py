@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import plain_offline as plain
 import pytest
-from off_policy import importance_sampling, model_based
 from plain_data import behaviour_of, episodes_of, random_data
 from random_worlds import random_world
 
 from taichi_ants import AntsError, Task, record, worlds
 from taichi_ants.learners.policies import action_probabilities
+from taichi_ants.offline.evaluation import importance_sampling, model_based
 from taichi_ants.offline.learners import tolerance
 
 STILL = Task(evaporation_in_evaluation=False)
@@ -69,3 +69,7 @@ def test_what_cannot_be_judged():
     assert np.isfinite(model_based(unknown, table).value)
     with pytest.raises(AntsError, match="q_values has shape"):
         model_based(data, np.zeros((3, 5)))
+    with pytest.raises(AntsError, match="`discount` is 1"):
+        model_based(data, table, 1.0)
+    with pytest.raises(AntsError, match="`resamples` is -1"):
+        importance_sampling(data, table, resamples=-1)

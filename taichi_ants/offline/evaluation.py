@@ -1,4 +1,4 @@
-"""Estimates of the value of a policy from data of another policy.
+"""Off-policy evaluation: estimates of the value of a policy from data of another policy.
 
 The *target policy* is the evaluated policy, and the *behaviour policy* generated the data. The
 value of a policy is its expected discounted return from the first states of the data's episodes.
@@ -7,14 +7,19 @@ value of a policy is its expected discounted return from the first states of the
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from taichi_ants import AntsError, Dataset
 from taichi_ants.analysis.statistics import resampling_counts
+from taichi_ants.errors import AntsError, expect
+from taichi_ants.learners.config import InitialValue
 from taichi_ants.learners.policies import action_probabilities, checked_values
-from taichi_ants.offline.learners import EmpiricalModel
+from taichi_ants.offline.dataset import Dataset
+from taichi_ants.offline.learners import Discount, EmpiricalModel
+from taichi_ants.settings import Flag, Setting, Share, checked_arguments
+
+Resamples = Annotated[int, Setting(least=0, most=100_000)]
 
 
 class PolicyValues(NamedTuple):
@@ -37,14 +42,15 @@ class PolicyValues(NamedTuple):
     effective_sample_size: np.ndarray
 
 
+@checked_arguments
 def importance_sampling(
     data: Dataset,
     q_values: np.ndarray,
-    discount: float = 0.9,
-    epsilon: float = 0.0,
-    weighted: bool = True,
-    resamples: int = 200,
-    level: float = 0.95,
+    discount: Share = 0.9,
+    epsilon: Share = 0.0,
+    weighted: Flag = True,
+    resamples: Resamples = 200,
+    level: Share = 0.95,
 ) -> PolicyValues:
     """Return values by per-decision importance sampling (Precup, Sutton and Singh, ICML 2000).
 
@@ -65,8 +71,9 @@ def importance_sampling(
         level: The confidence level of the intervals.
 
     Raises:
-        AntsError: The data have no behaviour probabilities.
+        AntsError: An argument is not allowed, or the data have no behaviour probabilities.
     """
+    expect("data", data, Dataset)
     if np.isnan(data.behaviour_probability).any():
         raise AntsError("behaviour_probability of the data contains nan; use model_based.")
     times, begins = _times(data, resamples), data.begins
@@ -93,23 +100,24 @@ def importance_sampling(
     return _values(data, q_values, epsilon, estimated, level)
 
 
+@checked_arguments
 def model_based(
     data: Dataset,
     q_values: np.ndarray,
-    discount: float = 0.9,
-    epsilon: float = 0.0,
-    initial_q: float = 0.0,
-    resamples: int = 200,
-    level: float = 0.95,
+    discount: Discount = 0.9,
+    epsilon: Share = 0.0,
+    initial_q: InitialValue = 0.0,
+    resamples: Resamples = 200,
+    level: Share = 0.95,
 ) -> PolicyValues:
     """Return the values of target policies in the empirical model of the data.
 
     This is the direct method (Jiang and Li, Doubly robust off-policy value evaluation for
     reinforcement learning, ICML 2016). Its variance is small, but it is biased for any amount of
     data if states are not Markov. Each resample has a separate model. Pairs of state and action
-    without data have the value `initial_q`. The discount must be below 1. Other arguments are those
-    of `importance_sampling`.
+    without data have the value `initial_q`. Other arguments are those of `importance_sampling`.
     """
+    expect("data", data, Dataset)
     times = _times(data, resamples)
     model, first = EmpiricalModel.of(data, times), data.state[data.begins[:-1]]
     starts = times / times.sum(axis=1, keepdims=True, dtype=np.int64)  # shares of episodes
