@@ -99,7 +99,7 @@ def bounded_function(rule: Rule) -> Callable[..., Any]:
 
 def difference(rule: Rule, n: int = TRIES) -> str:
     """Return the first difference of a rule and its Python function for n drawn inputs, or ""."""
-    drawn = [{**inputs, **parameters} for inputs, parameters in tries(rule, n)]
+    drawn = list(tries(rule, n))
     try:
         results = _results(rule, drawn)
     except Exception as error:

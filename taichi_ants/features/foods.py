@@ -36,9 +36,7 @@ class Food(Settings, path="task.foods.NAME"):
     pick_up: Annotated[Reward, Setting("reward for picking up this food")] = 3
     deliver: Annotated[Reward, Setting("reward for giving this food to the queen")] = 10
     loads: Annotated[int, Setting("loads in a cell", least=1, most=1_000_000)] = 1
-    regrowth: Annotated[
-        Ticks, Setting("time until an empty cell has all its loads again", least=0)
-    ] = None
+    regrowth: Annotated[Ticks, Setting("time until an empty cell is full again", least=0)] = None
 
 
 def food_numbers(task: Task) -> np.ndarray:

@@ -359,7 +359,7 @@ WRONG_EVENTS = {
         ["in [[at]] number 1, in the evaluation, the ants"],
     ),
     "one table": ("[[every]]", "[every]", ["[every] must be [[every]]"]),
-    "number": ("at.1.remove", "at.2.remove", ["the file has no table at.2; add it"]),
+    "number": ("at.1.remove", "at.2.remove", ["the file has no at.2; add it"]),
     "kind": ('kind = "colony"', 'kind = "runs"', ["in a file of kind 'colony'"]),
 }
 
