@@ -75,12 +75,9 @@ def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist
     widest = max(map(len, entries), default=0)
     columns = int(WIDTH / (0.6 + 0.068 * widest))  # inches at 9 points
     bold = {"size": 12, "weight": "bold"}
-    look: dict[str, Any] = {
-        "ncols": max(1, min(columns, len(entries))),
-        "columnspacing": 1.6,
-        "borderpad": 0.2,
-    }
-    look |= {"loc": "outside upper left", "alignment": "left", "title_fontproperties": bold}
+    look: dict[str, Any] = {"ncols": max(1, min(columns, len(entries))), "columnspacing": 1.6}
+    look |= {"borderpad": 0.2, "loc": "outside upper left", "alignment": "left"}
+    look |= {"title_fontproperties": bold}
     # The title belongs to the legend, which the layout engine would draw over a figure's title.
     figure.legend(entries.values(), entries.keys(), title=title, **look)
     figure.supxlabel(caption, x=0.008, ha="left", fontsize=8, color=GREY)

@@ -101,26 +101,20 @@ def difference(rule: Rule, n: int = TRIES) -> str:
     drawn = list(tries(rule, n))
     names = (*rule.inputs, *rule.parameters)
     lengths = [rule.inputs[name].length if name in rule.inputs else 0 for name in names]
-    rows = np.array(
-        [
-            [x for name in names for x in np.atleast_1d({**inputs, **parameters}[name])]
-            for inputs, parameters in drawn
-        ],
-        np.float64,
-    ).reshape(n, -1)
+    rows = [[x for name in names for x in np.atleast_1d(values[name])] for values in drawn]
     try:
-        results = _results(rule, rows, lengths)
+        results = _results(rule, np.array(rows, np.float64).reshape(n, -1), lengths)
     except Exception as error:
         return last_line(error)
-    for (inputs, parameters), result in zip(drawn, results.tolist(), strict=True):
+    for values, result in zip(drawn, results.tolist(), strict=True):
         try:
-            reference = float(rule.function(**inputs, **parameters))
+            reference = float(rule.function(**values))
         except Exception as error:
             said = f"{type(error).__name__}: {error}"
-            return f"its Python function fails ({said}) for {values_shown(inputs, parameters)}"
+            return f"its Python function fails ({said}) for {values_shown(values)}"
         if result != reference:
             said = f"its kernel returns {result!r}, but its Python function {reference!r}"
-            return f"{said}, for {values_shown(inputs, parameters)}"
+            return f"{said}, for {values_shown(values)}"
     return ""
 
 

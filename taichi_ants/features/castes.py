@@ -10,14 +10,13 @@ from taichi_ants.errors import AntsError
 from taichi_ants.features.feature import ANT, CASTE, Array, Feature, State, Task
 from taichi_ants.features.labour import Threshold
 from taichi_ants.features.life import Ticks
+from taichi_ants.grid.constants import MAX_CASTES, MAX_NESTS, TRAIL
 from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
     import numpy as np
 
-TRAIL = "trail"
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
-MAX_CASTES, MAX_NESTS = 16, 7
 Rate = Annotated[float | None, Setting(least=0, most=1)]
 Number = Annotated[int | None, Setting(least=0)]
 Temperature = Annotated[float | None, Setting(least=1e-6, most=1e6)]
@@ -30,10 +29,8 @@ class Caste(Settings, path="task.castes.NAME"):
     """A caste of ants, for colonies only.
 
     Ants of a caste share a table of action values, and can have their own numbers. None means that
-    they have those of the task, or of the training. A caste has a `share` of the ants of each nest,
-    or a number of `ants`; castes without both divide the remaining share equally. With a `policy`,
-    the ants of the caste follow it and do not learn. `threshold` can also be a number, which is a
-    fixed threshold.
+    they have those of the task, or of the training. Castes without `share` and `ants` divide the
+    remaining share equally. `threshold` can also be a number, which is a fixed threshold.
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -61,39 +58,28 @@ class Caste(Settings, path="task.castes.NAME"):
 
     most_entries = MAX_CASTES
 
-    share: Annotated[
-        Rate, Setting("share of the ants of a nest that `ants` does not give to castes")
-    ] = None
+    share: Annotated[Rate, Setting("share of the ants of a nest, after `ants` of castes")] = None
     ants: Annotated[
-        Number,
-        Setting("number of ants in each nest at the start, instead of a share", most=1 << 24),
+        Number, Setting("ants in each nest at the start, instead of a share", most=1 << 24)
     ] = None
-    nest: Annotated[
-        Number, Setting("number of the nest that has the caste; off: each nest", most=MAX_NESTS - 1)
-    ] = None
+    nest: Annotated[Number, Setting("number of its nest; off: each nest", most=MAX_NESTS - 1)] = (
+        None
+    )
     policy: Annotated[
-        str | None,
-        Setting(
-            "policy file, or the name of a hand-written policy, that the ants follow; off: learn"
-        ),
+        str | None, Setting("policy file, or name of a hand-written policy, to follow; off: learn")
     ] = None
     epsilon: Annotated[Rate, Setting("constant exploration rate")] = None
     epsilon_spread: Annotated[
-        Rate,
-        Setting("half the range of the exploration rates of the ants around `epsilon`", most=0.5),
+        Rate, Setting("half the range of exploration rates around `epsilon`", most=0.5)
     ] = None
     learning_rate: Annotated[Rate, Setting("constant learning rate", least=1e-37)] = None
     discount: Annotated[Rate, Setting("discount factor")] = None
     temperature: Annotated[Temperature, Setting("temperature of the rule softmax")] = None
-    k: Annotated[
-        Attraction, Setting("attraction of a cell without a trail, for the rule deneubourg")
-    ] = None
-    exponent: Annotated[
-        Exponent, Setting("exponent of the attraction of a cell, for the rule deneubourg")
-    ] = None
-    lays: Annotated[
-        str, Setting("pheromones that the ants lay: all, none, or names separated by commas")
-    ] = ALL
+    k: Annotated[Attraction, Setting("attraction of a cell without a trail (deneubourg)")] = None
+    exponent: Annotated[Exponent, Setting("exponent of the attraction of a cell (deneubourg)")] = (
+        None
+    )
+    lays: Annotated[str, Setting("pheromones to lay: all, none, or names with commas")] = ALL
     outbound_cue: Annotated[
         str | None, Setting("pheromone that ants without food see as T; off: that of the task")
     ] = None
@@ -122,8 +108,8 @@ class Caste(Settings, path="task.castes.NAME"):
         return [name.strip() for name in self.lays.split(",")]
 
 
-def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
-    """Return the share of each caste in the ants of a nest that `ants` does not give to castes.
+def parts_in(castes: Mapping[str, Caste], nest: int) -> list[tuple[int, float]]:
+    """Return the `ants` of each caste of a nest, 0 without, and its share of all other ants there.
 
     AntsError if the nest has no caste, or shares do not add up to 1.
     """
@@ -140,18 +126,12 @@ def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
             f"the shares of `task.castes` in nest {nest} add up to {sum(shares):g}; they must add "
             "up to 1, or to less if another caste has neither `share` nor `ants`."
         )
-    equal = max(left, 0.0) / n_open if n_open else 0.0
-    return [
-        0.0
-        if caste.nest not in (None, nest) or caste.ants is not None
-        else (equal if caste.share is None else caste.share)
-        for caste in castes.values()
-    ]
-
-
-def _fixed_in(castes: Mapping[str, Caste], nest: int) -> list[int]:
-    """Return the number `ants` of each caste in a nest, 0 without one."""
-    return [(caste.ants or 0) * (caste.nest in (None, nest)) for caste in castes.values()]
+    equal, parts = max(left, 0.0) / max(n_open, 1), []
+    for caste in castes.values():
+        share = equal if caste.share is None else caste.share
+        part = (0, share) if caste.ants is None else (caste.ants, 0.0)
+        parts.append(part if caste.nest in (None, nest) else (0, 0.0))
+    return parts
 
 
 def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
@@ -163,15 +143,16 @@ def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
 
     AntsError if there are too few ants, or ants without a caste.
     """
-    shares, counts = shares_in(castes, nest), _fixed_in(castes, nest)
-    rest = n - sum(counts)
-    if rest < 0 or (rest > 0 and not any(shares)):
+    parts = parts_in(castes, nest)
+    given = sum(ants for ants, _ in parts)
+    rest = n - given
+    if rest < 0 or (rest > 0 and not any(share for _, share in parts)):
         raise AntsError(
-            f"the castes have {sum(counts)} ants in nest {nest}, but {n} ants start there; change "
+            f"the castes have {given} ants in nest {nest}, but {n} ants start there; change "
             "`ants` of a caste, or give a caste a share."
         )
-    quotas = [round(share * rest, 9) for share in shares]
-    counts = [ants + int(quota) for ants, quota in zip(counts, quotas, strict=True)]
+    quotas = [round(share * rest, 9) for _, share in parts]
+    counts = [ants + int(quota) for (ants, _), quota in zip(parts, quotas, strict=True)]
     order = sorted(range(len(quotas)), key=lambda i: int(quotas[i]) - quotas[i])
     for i in order[: n - sum(counts)]:
         counts[i] += 1
@@ -183,9 +164,9 @@ def chances_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[float]:
 
     That is the caste's share, or its `ants` divided by n.
     """
-    shares, fixed, most = shares_in(castes, nest), _fixed_in(castes, nest), max(n, 1)
-    rest = (n - sum(fixed)) / most if n else 1.0
-    return [ants / most + share * rest for ants, share in zip(fixed, shares, strict=True)]
+    parts, most = parts_in(castes, nest), max(n, 1)
+    rest = (n - sum(ants for ants, _ in parts)) / most if n else 1.0
+    return [ants / most + share * rest for ants, share in parts]
 
 
 def _columns(state: State) -> dict[str, np.ndarray]:

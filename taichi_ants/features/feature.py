@@ -73,19 +73,15 @@ class Mark(NamedTuple):
         return np.rint(255 * shares).astype(np.uint8)
 
 
-class Measured(NamedTuple):
-    """A measure of the ants: a function of a `Snapshot`, the unit, and words."""
-
-    function: Function
-    unit: str
-    words: str
-
-
 class Input(NamedTuple):
-    """An input of your rules: its meaning, and its number of entries if it is a vector, else 0."""
+    """An input of your rules: its meaning, and its number of entries if it is a vector, else 0.
+
+    `by_deliveries` says whether it changes with the deliveries of a tick before ants observe.
+    """
 
     meaning: str
     length: int = 0
+    by_deliveries: bool = False
 
 
 @dataclass(eq=False, frozen=True, repr=False)
@@ -97,7 +93,6 @@ class Feature:
         switch: The setting of which the default means that a task does not use the feature; by
             default all settings of the group.
         uses: A function of a task that says whether it uses the feature, instead of the switch.
-        kills: Whether ants can die by it, so that slots become vacant.
         runs_alone: Whether lone ants have the feature, too.
         arrays: The arrays that it adds to the state of a colony.
         numbers: Settings that hooks read as `a.task.GROUP.SETTING`, f64.
@@ -110,17 +105,15 @@ class Feature:
         constants: A function of a colony that returns further arrays of its kernels.
         faults: A function of a task that yields what is wrong with it, as sentences.
         example: Settings of a task that uses the feature.
-        measures: Its measures by name.
+        measures: Its measures by name: a function of a `Snapshot`, the unit, and words.
         marks: The marks by which pages show its arrays of ants.
         hooks: Its hooks by the names of points.
         inputs: Inputs of your rules by name, with the functions of an ant that return them.
-        by_deliveries: The inputs that change with the deliveries of a tick before ants observe.
     """
 
     settings: type[Settings]
     switch: str = ""
     uses: Callable[[Task], bool] | None = None
-    kills: bool = False
     runs_alone: bool = False
     arrays: tuple[Array, ...] = ()
     numbers: tuple[str, ...] = ()
@@ -131,11 +124,10 @@ class Feature:
     constants: Callable[[State], Mapping[str, Any]] = lambda state: {}
     faults: Callable[[Task], Iterator[str]] = lambda task: iter(())
     example: Mapping[str, Any] = field(default_factory=dict)
-    measures: Mapping[str, Measured] = field(default_factory=dict)
+    measures: Mapping[str, tuple[Function, str, str]] = field(default_factory=dict)
     marks: tuple[Mark, ...] = ()
     hooks: dict[str, KernelFunction] = field(default_factory=dict)
     inputs: dict[str, tuple[Input, KernelFunction]] = field(default_factory=dict)
-    by_deliveries: set[str] = field(default_factory=set)
 
     @property
     def group(self) -> str:
@@ -164,7 +156,7 @@ class Feature:
         """Register a function as the hook at a point, as a decorator."""
 
         def register(body: Function) -> KernelFunction:
-            given, expected = " ".join(signature(body).parameters), POINTS[point].arguments
+            given, expected = " ".join(signature(body).parameters), POINTS[point]
             if given != expected:
                 raise TypeError(f"{body.__name__} has ({given}), but {point} needs ({expected})")
             self.hooks[point] = KernelFunction(body)
@@ -176,10 +168,8 @@ class Feature:
         """Register a function of an ant as an input of your rules, as a decorator."""
 
         def register(body: Function) -> KernelFunction:
-            name, words = body.__name__, f"{meaning}; needs `{self.settings.path}`"
-            self.inputs[name] = Input(words), KernelFunction(body)
-            if by_deliveries:
-                self.by_deliveries.add(name)
-            return self.inputs[name][1]
+            read = Input(f"{meaning}; needs `{self.settings.path}`", by_deliveries=by_deliveries)
+            self.inputs[body.__name__] = read, KernelFunction(body)
+            return self.inputs[body.__name__][1]
 
         return register

@@ -199,8 +199,7 @@ class Rasteriser:
             tables.append(marks(places, radius, Mark.OUTLINE, colours.INK))
         tables.append(self._ants(snapshot))
         if hexagon < _DOTS_BELOW:
-            # Ants would hide the queen's dot, and the dot would hide ants next to her. So ants are
-            # drawn over the dot, and an outline around the dot over the ants.
+            # The crowd around the queen hides her dot, and on top of it, the dot would hide ants.
             tables.append(marks(queens, _QUEEN_OUTLINE, Mark.OUTLINE, of_queens))
         draw_marks(frame, *tables)
         return frame
@@ -223,9 +222,8 @@ class Rasteriser:
 
     def cell_colours(self, snapshot: Snapshot) -> np.ndarray:
         """Return the colours of all cells, uint32 (grid.size,), by content or trail level."""
-        of_ground = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
-        of_ground[OBSTACLE] = colours.CELL_OBSTACLE
-        of_cells = of_ground[snapshot.ground & 15]
+        plain = np.array([colours.CELL_EMPTY, colours.CELL_OBSTACLE], np.uint32)
+        of_cells = plain[(snapshot.ground == OBSTACLE).astype(np.uint8)]
         foods, kinds, queens = _things_of(snapshot)
         of_cells[foods] = colours.FOOD_FLOORS[kinds]
         small = self.hexagon < _SMALLEST_DRAWING

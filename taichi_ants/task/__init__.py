@@ -6,10 +6,9 @@ from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
 from taichi_ants.task.choice import Choice
 from taichi_ants.task.field import Field
-from taichi_ants.task.food import Food
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
-from taichi_ants.task.rewards import Rewards
+from taichi_ants.task.rewards import Food, Rewards
 from taichi_ants.task.task import Task, Traffic, fetching, foraging, paper, queueing
 
 __all__ = [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from taichi_ants.grid.constants import MAX_CASTES as MAX_CASTES
+from taichi_ants.grid.constants import MAX_NESTS as MAX_NESTS
 from taichi_ants.grid.constants import MAX_STEPS as MAX_STEPS
 
 # Codes of the cells in view (two bits each in a state index).
@@ -17,10 +19,7 @@ OBSTACLE = SEES_OBSTACLE | SEES_OBSTACLE << 2
 FOOD = SEES_GOAL | SEES_OBSTACLE << 2
 QUEEN = SEES_OBSTACLE | SEES_GOAL << 2
 
-# The number of a nest is in three bits of an ant's mark, of which 0 means no ant.
-MAX_NESTS = 7
 MAX_FOOD_KINDS = 8
-MAX_CASTES = 16
 
 # Actions. The first three are moves, relative to the heading.
 LEFT, FORWARD, RIGHT, PICK_UP, GIVE = 0, 1, 2, 3, 4

@@ -1,12 +1,13 @@
-"""The reward of each event."""
+"""The reward of each event, and the kinds of food."""
 
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from taichi_ants.features.life import Ticks
 from taichi_ants.settings import Setting, Settings
-from taichi_ants.task.constants import MOST_REWARD
+from taichi_ants.task.constants import MAX_FOOD_KINDS, MOST_REWARD
 from taichi_ants.task.events import Event
 
 if TYPE_CHECKING:
@@ -25,13 +26,8 @@ class Rewards(Settings, path="task.rewards"):
     }
 
     empty: Annotated[Reward, Setting("reward for a move onto a cell seen as empty (E)")] = 0
-    failed: Annotated[
-        Reward, Setting("reward for a blocked move, failed pick-up or failed delivery")
-    ] = -1
-    shaping: Annotated[
-        Reward,
-        Setting("reward for a move onto a cell seen as T (trail) or S (nearer to the queen)"),
-    ] = 1
+    failed: Annotated[Reward, Setting("reward for a failed move, pick-up or delivery")] = -1
+    shaping: Annotated[Reward, Setting("reward for a move onto a cell seen as T or S")] = 1
     pick_up: Annotated[Reward, Setting("reward for picking up food")] = 3
     deliver: Annotated[Reward, Setting("reward for delivering food to the queen")] = 10
 
@@ -50,3 +46,25 @@ class Rewards(Settings, path="task.rewards"):
     def largest(self) -> int:
         """The largest absolute reward, which limits the range of returns."""
         return max(map(abs, astuple(self)))
+
+
+@dataclass(frozen=True)
+class Food(Settings, path="task.foods.NAME"):
+    """A kind of food, for colonies only.
+
+    A cell with food has a number of loads, of which an ant takes one. The cell is food until its
+    last load is taken; `regrowth` ticks later, it has all its loads again.
+    """
+
+    sentences: ClassVar[dict[str, str]] = {
+        "": "A cell has {loads} loads; the rewards are {pick_up} for picking up and {deliver} for "
+        "giving.",
+        "regrowth": "An empty cell has all its loads again after {regrowth} ticks.",
+    }
+
+    most_entries = MAX_FOOD_KINDS
+
+    pick_up: Annotated[Reward, Setting("reward for picking up this food")] = 3
+    deliver: Annotated[Reward, Setting("reward for giving this food to the queen")] = 10
+    loads: Annotated[int, Setting("loads in a cell", least=1, most=1_000_000)] = 1
+    regrowth: Annotated[Ticks, Setting("time until an empty cell is full again", least=0)] = None

@@ -20,7 +20,6 @@ from __future__ import annotations
 import os
 import re
 from itertools import permutations
-from typing import NamedTuple
 
 import numpy as np
 
@@ -54,13 +53,10 @@ def from_text(text: str, source: str = "the map") -> World:
     AntsError, which calls the text `source`, if the map is damaged.
     """
     expect(source, text, str)
-    level, drawn = _read(text, source)
-    ranges, cells = _placed(drawn, source)
+    level, marks, ranges, cells = _read(text, source)
     grid = AxialGrid(ranges)
     undrawn = grid.exists.copy()
     undrawn[grid.index(cells)] = False
-
-    marks = np.array([character.mark for character in drawn])
     queens = [mark for mark in marks if mark in QUEENS]
     if sorted(queens) != [*QUEENS[: max(1, len(queens))]]:
         listed = f"the queens {' '.join(queens)}" if queens else "no queen"
@@ -85,26 +81,13 @@ def from_text(text: str, source: str = "the map") -> World:
 
 def ranges_of(text: str) -> tuple[int, int, int]:
     """Return the ranges of the world drawn in `text`, without building it."""
-    *_, drawn = _read(text, "the map")
-    return _placed(drawn, "the map")[0]
+    return _read(text, "the map")[2]
 
 
-class _Character(NamedTuple):
-    """A character of a drawing; `line` counts all lines from 1, `row` lines of the drawing."""
-
-    mark: str
-    line: int
-    row: int
-    column: int
-
-    def described(self, source: str) -> str:
-        return f"line {self.line}, column {self.column + 1} of {source} has {self.mark!r}"
-
-
-def _read(text: str, source: str) -> tuple[int, list[_Character]]:
-    """Return the level of trails, and the characters of the drawing."""
+def _read(text: str, source: str) -> tuple[int, np.ndarray, tuple[int, int, int], np.ndarray]:
+    """Return the level of trails, characters, ranges of the smallest world, and cells (n, 3)."""
     level, row = 0, 0
-    drawn: list[_Character] = []
+    drawn: list[tuple[str, int, int, int]] = []  # character, line, row without comments, column
     text = text.removeprefix("\ufeff")  # the byte-order mark, which some editors write
     for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1):
         if line.lstrip().startswith(";"):
@@ -119,34 +102,31 @@ def _read(text: str, source: str) -> tuple[int, list[_Character]]:
                 )
             continue
         row += 1
-        drawn += [_Character(m, number, row, column) for column, m in enumerate(line) if m != " "]
-    for character in drawn:
-        if character.mark not in _CELLS:
-            raise AntsError(f"{character.described(source)}; use only {_ALLOWED}.")
+        drawn += [(mark, number, row, column) for column, mark in enumerate(line) if mark != " "]
     if not drawn:
         raise AntsError(f"{source} has no cells; draw cells with {_ALLOWED}.")
-    return level or DEFAULT_TRAIL_LEVEL, drawn
 
+    def refuse(wrong: np.ndarray, why: str) -> None:
+        if wrong.any():
+            mark, number, _, column = drawn[int(wrong.argmax())]
+            raise AntsError(f"line {number}, column {column + 1} of {source} has {mark!r}{why}.")
 
-def _placed(drawn: list[_Character], source: str) -> tuple[tuple[int, int, int], np.ndarray]:
-    """Return the ranges of the smallest world of the characters, and their cells, (n, 3)."""
+    marks, _, rows, columns = (np.array(part) for part in zip(*drawn, strict=True))
+    refuse(~np.isin(marks, [*_CELLS]), f"; use only {_ALLOWED}")
     # A column is 2 r and a row r - 2 q, both up to a shift. So all cells have the same parity of
     # the column and of row - r; the majority of the characters determines it.
-    rows = np.array([character.row for character in drawn])
-    columns = np.array([character.column for character in drawn])
     odd = columns % 2
     r = (columns - odd) // 2
     grids = 2 * odd + (rows - r) % 2
     grid = np.bincount(grids).argmax()
-    stray = np.flatnonzero(grids != grid)
-    if len(stray):
-        raise AntsError(
-            f"{drawn[stray[0]].described(source)}, which is between two cells; place the cells of "
-            "a line four columns apart, and offset neighbouring lines by two columns."
-        )
+    refuse(
+        grids != grid,
+        ", which is between two cells; place the cells of a line four columns apart, and offset "
+        "neighbouring lines by two columns",
+    )
     axials = np.stack([(r - rows + grid % 2) // 2, r], axis=1)
     ranges, origin = smallest_world(axials)
-    return ranges, cube(axials - origin)
+    return level or DEFAULT_TRAIL_LEVEL, marks, ranges, cube(axials - origin)
 
 
 def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int, int]]:
@@ -192,31 +172,29 @@ def to_text(world: World) -> str:
     Raises AntsError for trails of several levels, and for trails under food or the queen.
     """
     expect("world", world, World)
-    levels = np.unique(world.trails[:, 3])
-    on_trail = {tuple(cell) for *cell, _ in world.trails.tolist()}
-    hidden = on_trail & set(map(tuple, [*world.queens.tolist(), *world.foods.tolist()]))
+    grid, levels = world.grid, np.unique(world.trails[:, 3])
+    parts = (world.foods, world.queens, world.trails, world.ants)
+    foods, queens, trails, ants = (grid.index(part[:, :3]) for part in parts)
     for what, is_there in (
         (f"trails of {len(levels)} levels", len(levels) > 1),
         (f"{world.n_nests} nests", world.n_nests > len(QUEENS)),
         (f"{world.n_food_kinds} kinds of food", world.n_food_kinds > len(FOODS)),
-        ("a trail under the queen or food", bool(hidden)),
+        ("a trail under the queen or food", np.isin(trails, [*queens, *foods]).any()),
         ("regions", bool(world.regions)),
     ):
         if is_there:
             raise AntsError(f"a map cannot show {what}; change this in the world.")
-    marks = [(world.grid.cells(np.flatnonzero(world.grid.exists)), EMPTY)]
-    kinds = world.kinds_by_cell()[world.grid.index(world.foods)]
-    marks.append((world.obstacles, OBSTACLE))
-    marks += [(world.foods[kinds == kind], FOODS[kind]) for kind in range(world.n_food_kinds)]
-    marks += [(cell[None], QUEENS[nest]) for nest, cell in enumerate(world.queens)]
-    marks += [(world.trails[:, :3], TRAIL)]
-    for *cell, heading in world.ants.tolist():
-        letters = ANTS_ON_TRAIL if tuple(cell) in on_trail else ANTS
-        marks.append((np.array([cell]), letters[heading]))
+    marks = np.where(grid.exists, EMPTY, " ")
+    marks[grid.index(world.obstacles)] = OBSTACLE
+    marks[foods] = np.array([*FOODS])[world.kinds_by_cell()[foods]]
+    marks[queens] = [*QUEENS[: world.n_nests]]
+    marks[trails] = TRAIL
+    letters = np.array([[*ANTS], [*ANTS_ON_TRAIL]])
+    marks[ants] = letters[np.isin(ants, trails).astype(int), world.ants[:, 3]]
     lines = (f"trail = {level}\n" for level in levels)
     size_x, size_y, size_z = world.ranges
     page = np.full((2 * size_x + size_y + size_z - 3, 2 * (size_y + size_z) - 3), " ")
-    for cells, mark in marks:  # later ones cover earlier ones
-        x, y, z = cells.T
-        page[y + z - 2 * (x - size_x + 1), 2 * (y - z + size_z - 1)] = mark
+    existing = np.flatnonzero(grid.exists)
+    x, y, z = grid.cells(existing).T
+    page[y + z - 2 * (x - size_x + 1), 2 * (y - z + size_z - 1)] = marks[existing]
     return "".join([*lines, *("".join(row).rstrip() + "\n" for row in page)])

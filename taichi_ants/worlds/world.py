@@ -277,11 +277,8 @@ class World:
 
     def __repr__(self) -> str:
         queens = f"queen={self.queen}" if self.n_nests == 1 else f"queens: {self.n_nests}"
-        return (
-            f"World(ranges={self.ranges}, {queens}, foods: {len(self.foods)}, "
-            f"obstacles: {len(self.obstacles)}, trails: {len(self.trails)}, "
-            f"ants: {len(self.ants)})"
-        )
+        counts = ", ".join(f"{name}: {len(getattr(self, name))}" for name in _PARTS)
+        return f"World(ranges={self.ranges}, {queens}, {counts})"
 
 
 def free_cells(

@@ -37,7 +37,7 @@ def room(shared):
     with Guest(shared) as guest:
         guest.ask("begin", chosen=CHOSEN)
         guest.until("whole")
-    while shared._pages:
+    while shared.pages:
         time.sleep(0.01)
     return shared
 
@@ -185,7 +185,7 @@ def test_time_passes_while_somebody_looks_on(room):
         began = time.monotonic()
         guest.until("frame")
         assert time.monotonic() - began > 0.5
-    while room._pages:
+    while room.pages:
         time.sleep(0.01)
     time.sleep(0.1)
     stands = room.session.ticks

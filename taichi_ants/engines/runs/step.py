@@ -17,9 +17,11 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import FOOD, FORWARD, LEFT, PICK_UP, QUEEN, RIGHT
 from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.observations import Observation
-from taichi_ants.task.rules import noise, vision
+from taichi_ants.task.rules import vision
 from taichi_ants.task.rules.actions import (
     MOVES,
+    can_give,
+    heading_after_delivery,
     is_open,
     move_event,
     step_towards,
@@ -27,7 +29,6 @@ from taichi_ants.task.rules.actions import (
     turn_round,
     turned_by,
 )
-from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
 from taichi_ants.task.rules.pheromone import FADING, NONE, level_after_deposit, level_left
 from taichi_ants.task.rules.policy import bit_number, lowest_bit_number
 
@@ -173,12 +174,12 @@ def observe_function(rules: Rules) -> Callable[..., Any]:
         if ti.static(not is_paper):
             view = see(a, base, ant, clock)
             if ti.static(sees):
-                after = noise.misread_view(
+                after = vision.misread_view(
                     view, observation, ant.random_state, sees, ant_view(a, ant)
                 )
             state = encode(view)
         elif ti.static(sees):  # no view is needed
-            state, after = noise.misread_paper_state(
+            state, after = vision.misread_paper_state(
                 paper_state, ant.random_state, sees, ant_view(a, ant)
             )
         return paper_state, state, after
