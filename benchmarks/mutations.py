@@ -323,7 +323,6 @@ MUTATIONS = [
     ("live/server.py", "not (knows or (", "not (True or (", SERVER),
     ("live/server.py", "len(host) == 1 and host[0] in hosts", "len(host) == 1", SERVER),
     ("live/server.py", "self._runs and bool(self.pages)", "self._runs", SERVER),
-    ("live/server.py", "self._joined < _MOST_PAGES", "self._joined <= _MOST_PAGES", SERVER),
     ("live/server.py", 'request.get("do") in _CHANGES', "False", SERVER),
     ("live/server.py", "in_a_row or before.to_bytes() == session.to_bytes()", "in_a_row", SERVER),
     # Worlds and the grid.
