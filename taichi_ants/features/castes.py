@@ -80,12 +80,10 @@ class Caste(Settings, path="task.castes.NAME"):
         None
     )
     lays: Annotated[str, Setting("pheromones to lay: all, none, or names with commas")] = ALL
-    outbound_cue: Annotated[
-        str | None, Setting("pheromone that ants without food see as T; off: that of the task")
-    ] = None
-    homing_cue: Annotated[
-        str | None, Setting("what ants with food see as S; off: the cue of the task")
-    ] = None
+    outbound_cue: Annotated[str | None, Setting("pheromone seen as T; off: that of the task")] = (
+        None
+    )
+    homing_cue: Annotated[str | None, Setting("cue seen as S; off: that of the task")] = None
     lifespan: Annotated[Ticks, Setting("age at which an ant dies; off: that of the task")] = None
     threshold: Annotated[Threshold, Setting("response thresholds of the ants")] = Threshold()
 

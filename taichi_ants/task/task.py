@@ -57,9 +57,7 @@ class Traffic(Settings, path="task.traffic"):
     }
 
     swap: Annotated[bool, Setting("let ants with food change places with ants without")] = False
-    follow: Annotated[bool, Setting("let ants enter cells that ants leave in the same tick")] = (
-        False
-    )
+    follow: Annotated[bool, Setting("let ants enter cells that ants leave in the tick")] = False
     carriers_first: Annotated[
         bool, Setting("let carriers win cells that foragers want too; requires swap or follow")
     ] = False
