@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.errors import AntsError, count
@@ -161,7 +160,6 @@ def live(
     `save` is the file of the colony, which is saved even if drawing fails. `render` is a picture
     (.png) of the end, or an animation (.gif).
     """
-    from taichi_ants.files import check_writable_folder
     from taichi_ants.rendering import colony_snapshots, frames, save_animation
     from taichi_ants.rendering.writers import is_picture
 
@@ -177,7 +175,6 @@ def live(
     except (AntsError, OSError) as raised:
         error = raised  # the colony is intact, because drawing happens between ticks
     if save is not None:
-        check_writable_folder(Path(save).parent)
         colony.save(save)
     if error is not None:
         raise error

@@ -16,6 +16,7 @@ from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.results import Trace
 from taichi_ants.errors import AntsError, count, expect
 from taichi_ants.features import used_by
+from taichi_ants.features.castes import update_weights_of
 from taichi_ants.features.feature import Feature, Mark
 from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
@@ -244,7 +245,7 @@ class Recorder:
         moved = self._tables().astype(np.float64).ravel()[pairs] - before.ravel()[pairs]
         _, pair, ants = np.unique(pairs, return_inverse=True, return_counts=True)
         castes = self.colony.castes[0, slots]
-        weights = self.colony.update_weights_of(castes, ants[pair])
+        weights = update_weights_of(self.colony, castes, ants[pair])
         values = np.full(len(moved), np.nan)
         errors[acted] = np.divide(moved, weights, out=values, where=weights > 0)
         return errors
@@ -275,12 +276,12 @@ class Recorder:
         rates = (colony.epsilon, colony.learning_rate)
         delivered = colony.delivered[0] + totals[0]
         counts = (len(numbers), delivered, self.ticks)
-        stored = [colony.stored_trail(0, name) for name in (TRAIL, *colony.task.fields)]
+        stored = [colony.stored_pheromone(0, n) for n in range(len(colony.pheromones))]
         clocks = [clock for _, clock in stored]
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, *clocks)
         sections["progress"], self._new = self._new, []
         layers = {"ground": snapshot.ground, "kinds": snapshot.food_kinds}
-        layers |= {f"trail{number or ''}": layer for number, (layer, _) in enumerate(stored)}
+        layers |= {f"trail{number or ''}": layer.copy() for number, (layer, _) in enumerate(stored)}
         for name, layer in layers.items():
             cells = np.flatnonzero(self._sent.get(name, 0) != layer)
             sections |= {f"{name}_at": cells, name: layer[cells]}
