@@ -221,6 +221,42 @@ class Model:
         parts = [name.split(".") for name in self.rows[0]]
         return list(dict.fromkeys(part[2] for part in parts if part[:2] == ["task", group]))
 
+    def entities(self) -> list[Row]:
+        """Return the kinds of entities with their numbers in a world."""
+        ranges = (world["ranges"] for world in self.places)
+        cells = {x * y + y * z + z * x - x - y - z + 1 for x, y, z in ranges}
+        named = {
+            "castes of ants": self.entries("castes"),
+            "kinds of food": self.entries("foods"),
+            "further pheromones": self.entries("fields"),
+        }
+        return [
+            ("cells", _several(sorted(cells))),
+            ("nests, each with a queen", _several(sorted({*map(_nests, self.places)}))),
+            ("ants at the start", _several([row.get("ants", 1) for row in self.rows])),
+            *((words, f"{len(n)}: {', '.join(n)}") for words, n in named.items() if n),
+        ]
+
+    def schedule(self) -> str:
+        """Return the steps of a tick, in order, without those that the study never takes."""
+
+        def has(pattern: str, *never: Any) -> bool:
+            names = {name for row in self.rows for name in row if re.search(pattern, name)}
+            return any(row.get(name, None) not in never for row in self.rows for name in names)
+
+        steps = {
+            "Ants choose actions": True,
+            "of the ants that want one cell or food item, one wins": self.of_colony,
+            "ants act, get their rewards, and deposit": True,
+            "pheromones evaporate and spread": has(r"\.evaporation$", "none", None),
+            "ants are born and die": has(r"\.(births|lifespan)$", None, False),
+            "food grows back, and piles move": has(r"\.(regrowth|pile_move_interval)$", None),
+            "ants observe": True,
+            "ants learn": any(row["episodes"] for row in self.rows),
+        }
+        listed = "; ".join(step for step, is_there in steps.items() if is_there)
+        return f"{listed}. All ants finish a step before the next one begins."
+
     def state_variables(self) -> list[Row]:
         """Return the state variables: entity, name, values and unit."""
         names = {row["task.observation"] for row in self.rows} & {*observations.names()}
@@ -278,7 +314,7 @@ def described(model: Model, command: str) -> str:
     worlds = [
         (
             *(str(world[size]) for size in sizes),
-            str(len(world.get("queens", "Q"))),
+            str(_nests(world)),
             f"`{world['sha256'][:16]}`",
         )
         for world in model.places[:_MOST]
@@ -287,6 +323,8 @@ def described(model: Model, command: str) -> str:
     variables = ("Entity", "State variable", "Values", "Unit")
     parts = {
         "command": command,
+        "entities": _table(("Entity", "Number in a world"), model.entities()),
+        "schedule": model.schedule(),
         "state_variables": _table(variables, model.state_variables()),
         "learning": model.learning(),
         "sensing": model.sensing(),
@@ -307,6 +345,10 @@ def _table(heads: Row, rows: Iterable[Row]) -> str:
     """Return a table as Markdown, "" without rows."""
     cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
     return Table("", heads, cells, text_columns=len(heads)).markdown().rstrip()
+
+
+def _nests(world: Mapping[str, Any]) -> int:
+    return len(world.get("queens", "Q"))
 
 
 def _list_of(value: Any) -> list[Any]:

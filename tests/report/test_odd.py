@@ -177,7 +177,7 @@ def test_a_study_without_learning_has_no_parameters_of_learning():
     assert "With food, its ants see cells as S by `a`." in text
     assert "Ants without food see cells as T by the levels of `a`." in text
     assert "A deposit sets the level of a cell: `c = 100, 200`." in text
-    assert "| ant | caste | alpha, beta |" in text
+    assert "| castes of ants | 2: alpha, beta |" in text
     assert "| cell | level of `a` | at least 0 | level |" in text
     assert "| `entropy.a` | entropy of each pheromone field" in text
 
@@ -253,9 +253,11 @@ def test_each_sentence_is_said_where_its_settings_hold():
         "The threshold of its ants is 4.",
         "Its ants lay these pheromones: none.",
         "An ant with food that wins a cell changes places",
+        "ants are born and die",
     ):
         assert said in text
     assert "| ant | age | at least 0 | ticks |" in text
+    assert "food grows back" not in text
     text = text_of(
         *(
             RunPoint(worlds.paper(), Task().replace(noise={"slip": p}), SARSA, 9, 9)
@@ -263,12 +265,13 @@ def test_each_sentence_is_said_where_its_settings_hold():
         )
     )
     assert "In some of the points: With probability 0.5, an ant executes" in text
+    assert "ants are born" not in text
     assert "*Traffic.*" not in text
 
 
 def test_rows_of_tables_have_as_many_cells_as_their_heads():
     blocks = [one for one in of_task(foraging(), capacity=9).split("\n\n") if one[0] == "|"]
-    assert len(blocks) == 4
+    assert len(blocks) == 5
     for block in blocks:
         assert len({line.replace("\\|", "").count("|") for line in block.strip().split("\n")}) == 1
 
