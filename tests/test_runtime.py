@@ -89,6 +89,15 @@ def init(**settings):
     with contextlib.redirect_stdout(io.StringIO()):
         ti.init(**{"arch": ti.cpu, "fast_math": False, "log_level": ti.ERROR, **settings})
 
+field = ti.field(ti.i32, 4)  # in the Taichi that this package has started
+try:
+    runtime.start(threads=runtime.start().threads + 1)
+except AntsError as error:
+    assert "and has fields or arrays; leave" in str(error), error
+else:
+    raise AssertionError("it was restarted")
+assert same()
+
 init(cpu_max_num_threads=3)
 field = ti.field(ti.i32, 4)
 field.fill(7)

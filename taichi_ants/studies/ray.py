@@ -43,6 +43,8 @@ class RayWorkers(Executor):
         where: dict[str, Any] = {"num_cpus": available_threads(), "include_dashboard": False}
         if address:
             _check_listens(address)
+            if _has_token():  # `ray start` demands it then; clusters without tokens ignore it
+                os.environ.setdefault("RAY_AUTH_MODE", "token")
             own = str(Path(taichi_ants.__file__).parent)
             where = {"runtime_env": {"py_modules": [own]}}
         self._ray = imported("a cluster", "ray", "ray")
@@ -101,6 +103,12 @@ class RayWorkers(Executor):
 
     def __exit__(self, *raised: object) -> None:
         self._ray.shutdown()
+
+
+def _has_token() -> bool:
+    """Return whether this machine has a token of Ray, by which clusters know their users."""
+    names = {"RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"}
+    return bool(names & os.environ.keys()) or Path("~/.ray/auth_token").expanduser().exists()
 
 
 def _check_listens(address: str) -> None:

@@ -22,6 +22,8 @@ from command_lines import (
     start,
 )
 
+from taichi_ants.studies.ray import _has_token
+
 SWEEP = """
 kind = "runs"
 measures = ["return_all", "greedy_deliveries"]
@@ -78,6 +80,16 @@ def test_ray_is_an_extra(monkeypatch, sweep):
     assert status == 2
     assert_one_sentence(err)
     assert 'needs ray, which cannot be imported; run pip install -e ".[ray]"' in err
+
+
+def test_a_token_of_this_machine_is_found(monkeypatch, tmp_path):
+    for name in ("RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert not _has_token()
+    (tmp_path / ".ray").mkdir()
+    (tmp_path / ".ray" / "auth_token").write_text("a")
+    assert _has_token()
 
 
 # The slow tests, which start Ray, and the long ones, which start a cluster.
