@@ -140,8 +140,8 @@ class DeclaredSetting(NamedTuple):
         named = self.kind.named() if self.is_group else {}  # type: ignore[attr-defined]
         words = self.allowed_words or tuple(named)
         allowed = f"one of {', '.join(words)}" if words else self._range
-        parts = [self.rule.help, *([f"in {self.rule.unit}"] if self.rule.unit else [])]
-        parts = [", ".join(parts), *([allowed] if allowed else [])]
+        unit = f", in {self.rule.unit}" if self.rule.unit else ""
+        parts = [self.rule.help + unit, *([allowed] if allowed else [])]
         if self.rule.only is not None:
             other, *values = self.rule.only
             flag = _below(self.path.rpartition(".")[0], other).replace("_", "-")

@@ -1,4 +1,4 @@
-"""Checks of rules, observations and learners that you wrote."""
+"""Checks of rules and observations that you wrote; `taichi-ants check` checks learners, too."""
 
 from __future__ import annotations
 
@@ -7,23 +7,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants import learners, rules, runtime, worlds
+from taichi_ants import rules, runtime, worlds
 from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.engines.own_rules import difference
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features import FEATURES
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.rules import Rule
-from taichi_ants.settings import declared
+from taichi_ants.rules.rule import Rule, drawn_parameters
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.task.field import TRAIL
+from taichi_ants.task.field import OCCASIONS, TRAIL
 from taichi_ants.worlds import World
 
 SEEDS, TICKS = 6, 60
-__all__ = ["RuleCheck", "check_learner", "check_observation", "check_rule"]
+__all__ = ["RuleCheck", "check_observation", "check_rule"]
 __dir__ = __all__.copy  # completion lists only public names
-_LAID = ("with_food", "without_food", "always", "dead_end", "failed_pick_up")
+# Of ants: views of a colony, and the same in the reference.
+_COMPARED = {
+    **{"headings": "heading", "carrying": "carries", "paper_states": "paper_state"},
+    **{"states": "state", "actions": "action", "events": "event", "rewards": "reward"},
+}
 
 
 class RuleCheck(NamedTuple):
@@ -55,19 +59,11 @@ class RuleCheck(NamedTuple):
 def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
     """Return the result of a comparison of a rule in kernels with its Python function.
 
-    First the results for drawn inputs are compared, then small drawn colonies that use the rule.
-    After each tick, cells, headings, loads, paper states, actions, events, rewards, states, levels
-    and action values must be equal in every bit.
-
-    Args:
-        name: The name of a registered rule.
-        inputs: The number of drawn inputs.
-
-    Raises:
-        AntsError: There is no rule of this name.
+    First the results for a number of drawn `inputs` are compared, then small drawn colonies that
+    use the rule. After each tick, cells, headings, loads, paper states, actions, events, rewards,
+    states, levels and action values must be equal in every bit. AntsError if there is no rule of
+    this name.
     """
-    from taichi_ants.engines.own_rules import difference
-
     rule = rules.get(name)
     checked_whole("inputs", inputs)
     runtime.start()
@@ -81,13 +77,7 @@ def check_observation(name: str) -> RuleCheck:
     """Return the result of a comparison of an observation in kernels with its Python function.
 
     Small drawn colonies that use it are compared as in `check_rule`. The reference computes the
-    view of each ant by a separate implementation.
-
-    Args:
-        name: The name of a registered observation.
-
-    Raises:
-        AntsError: There is no observation of this name.
+    view by a separate implementation. AntsError if there is no observation of this name.
     """
     observation = observations.get(name)
     runtime.start()
@@ -98,20 +88,6 @@ def check_observation(name: str) -> RuleCheck:
         return common.replace(observation=name, homing_cue=cue, noise=noise)
 
     return RuleCheck(name, 0, *_compared(task_of), observation.reads)
-
-
-def check_learner(name: str) -> str:
-    """Return the fault of a learner that learns from drawn steps, or an empty string.
-
-    This finds indices outside an array, and learners that write into the memory of other runs. It
-    restarts Taichi; an index that Taichi cannot check can end the process.
-
-    Raises:
-        AntsError: There is no learner of this name.
-    """
-    from taichi_ants.engines.learner_check import fault_of
-
-    return fault_of(learners.get(name))
 
 
 def _compared(task_of: Callable[[int], Task]) -> tuple[int, str]:
@@ -138,12 +114,7 @@ def _task(rule: Rule, seed: int) -> Task:
 
     Kernels are compiled for two tasks only, with one nest and with two; others differ in numbers.
     """
-    rng, drawn, numbers = np.random.default_rng([seed, 17]), seed % 2, {}
-    for setting in declared(rule.settings):
-        least, most = setting.rule.least, setting.rule.most
-        if least is not None and most is not None and rng.random() < 0.5:
-            value = float(rng.uniform(least, most))
-            numbers[setting.name] = round(value) if setting.kind is int else value
+    drawn, numbers = seed % 2, drawn_parameters(rule, np.random.default_rng([seed, 17]))
     settings: dict = {"rules": {rule.name: numbers}}
     for feature in FEATURES:
         if any(name in rule.inputs for name in feature.inputs):
@@ -153,7 +124,7 @@ def _task(rule: Rule, seed: int) -> Task:
     elif rule.kind == "reward":
         settings |= {"reward": rule.name, "homing_cue": ("compass", "trail")[drawn]}
     else:
-        second = {"deposited_when": _LAID[seed % len(_LAID)], rule.kind: rule.name}
+        second = {"deposited_when": [*OCCASIONS][seed % 5], rule.kind: rule.name}
         settings |= {"pheromone": {rule.kind: rule.name}, "fields": {"second": second}}
     return _common(rule.fields, drawn).replace(**settings)
 
@@ -196,16 +167,11 @@ def _difference(colony: Colony, plain: ReferenceColony) -> str:
     ours, grid = colony.snapshot(), colony.grid
     order = np.argsort(colony.numbers[0])
     ants = [plain.ants[slot] for slot in sorted(plain.ants, key=lambda n: plain.ants[n].number)]
-    pairs = {
-        "cells": (grid.cells(colony.cells[0, order]), [ant.cell for ant in ants]),
-        "headings": (colony.headings[0, order], [ant.heading for ant in ants]),
-        "loads": (colony.carrying[0, order], [ant.carries for ant in ants]),
-        "paper_states": (colony.paper_states[0, order], [ant.paper_state for ant in ants]),
-        "states": (colony.states[0, order], [ant.state for ant in ants]),
-        "actions": (colony.actions[0, order], [ant.action for ant in ants]),
-        "events": (colony.events[0, order], [ant.event for ant in ants]),
-        "rewards": (colony.rewards[0, order], [ant.reward for ant in ants]),
+    pairs: dict[str, tuple] = {
+        "cells": (grid.cells(colony.cells[0, order]), [ant.cell for ant in ants])
     }
+    for view, name in _COMPARED.items():
+        pairs[view] = getattr(colony, view)[0, order], [getattr(ant, name) for ant in ants]
     ground = list(plain.world.ground)
     places = grid.index(np.array(ground, np.int64).reshape(-1, 3))
     for name, trail in plain.world.pheromones.items():

@@ -99,34 +99,29 @@ def test_a_new_feature_is_refused_wherever_no_set_names_it(who):
         ALL[who](ToyTask(toy=True))
 
 
-REFUSED = [  # changes of the paper's task, the words of the message, and who does not support it
+ALONE = ["HexForageEnv", "EpisodeBounds"]
+# Changes of the paper's task, the message after "`task.", and who does not support it.
+REFUSED = [
     (
         {"life": {"births": True}},
-        "`task.life.births` is True",
-        [*LONE_RUNS, "EpisodeBounds", "HexForageEnv", "HexColonyVectorEnv"],
+        "life.births` is True",
+        [*LONE_RUNS, *ALONE, "HexColonyVectorEnv"],
     ),
-    ({"life": {"regrowth": 0}}, "`task.life.regrowth` is 0", [*LONE_RUNS, "EpisodeBounds"]),
-    (
-        {"pheromone": {"diffusion": 0.5}},
-        "`task.pheromone.diffusion` is 0.5",
-        [*LONE_RUNS, "HexForageVectorEnv", "EpisodeBounds"],
-    ),
+    ({"life": {"regrowth": 0}}, "life.regrowth` is 0", [*LONE_RUNS, "EpisodeBounds"]),
+    ({"pheromone": {"diffusion": 0.5}}, "pheromone.diffusion` is 0.5", [*LONE_RUNS, *ALONE]),
     (
         {"pheromone": {"evaporation": "exponential"}},
-        "`task.pheromone.evaporation` is 'exponential'",
-        [*LONE_RUNS, "HexForageEnv"],
+        "pheromone.evaporation` is 'exponential'",
+        [*LONE_RUNS, "HexForageVectorEnv"],
     ),
-    ({"fields": {"home": {}}}, "`task.fields` has home", [*LONE_RUNS, "HexForageEnv", "form"]),
-    ({"homing_cue": "trail"}, "`task.homing_cue` is 'trail'", [*LONE_RUNS, "form"]),
-    ({"foods": {"sap": {}, "seed": {}}}, "`task.foods` has sap, seed", [*LONE_RUNS, *OTHERS]),
-    ({"castes": {"a": {}}}, "`task.castes` has a", [*LONE_RUNS, *ENVIRONMENTS, *OTHERS]),
-    (
-        {"choice": "deneubourg"},
-        "`task.choice.rule` is 'deneubourg'",
-        [*LONE_RUNS, *ENVIRONMENTS, "record_colony"],
-    ),
-    ({"choice": "softmax"}, "`task.choice.rule` is 'softmax'", [*ENVIRONMENTS]),
-    ({"noise": {"slip": 0.1}}, "`task.noise.slip` is 0.1", ["EpisodeBounds"]),
+    ({"fields": {"home": {}}}, "fields` has home", [*LONE_RUNS, "HexForageEnv", "form"]),
+    ({"homing_cue": "trail"}, "homing_cue` is 'trail'", [*LONE_RUNS, "form"]),
+    ({"foods": {"sap": {}, "seed": {}}}, "foods` has sap, seed", [*LONE_RUNS, *OTHERS]),
+    ({"castes": {"a": {}}}, "castes` has a", [*LONE_RUNS, *ENVIRONMENTS, *OTHERS]),
+    ({"choice": "deneubourg"}, "choice.rule` is 'deneubourg'", [*LONE_RUNS, *ENVIRONMENTS]),
+    ({"choice": "deneubourg"}, "choice.rule` is 'deneubourg'", ["record_colony"]),
+    ({"choice": "softmax"}, "choice.rule` is 'softmax'", [*ENVIRONMENTS]),
+    ({"noise": {"slip": 0.1}}, "noise.slip` is 0.1", ["EpisodeBounds"]),
 ]
 
 
@@ -134,7 +129,7 @@ REFUSED = [  # changes of the paper's task, the words of the message, and who do
     ("changes", "words", "who"), [(*row, who) for *row, several in REFUSED for who in several]
 )
 def test_features_are_refused_where_they_are_not_supported(changes, words, who):
-    message = rf"^{re.escape(words)}, which .* does not support; [^.]*\.$"
+    message = rf"^`task\.{re.escape(words)}, which .* does not support; [^.]*\.$"
     with pytest.raises(AntsError, match=message):
         ALL[who](Task().replace(**changes))
 

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _RESAMPLES = 4000  # of figures, which have many intervals
-_WIDE = 100  # the number of columns of a table in a terminal
 _EPISODES, _TICKS = "episode", "tick"
 
 
@@ -41,19 +40,15 @@ class Summary:
     rows: tuple[dict[str, Any], ...]
 
     def __repr__(self) -> str:
-        several = len({row["configuration"] for row in self.rows}) > 1
-        lines = [
-            [
-                *([row["configuration"]] if several else []),
-                f"{row['measure']} ({row['unit']})" if row["unit"] else row["measure"],
-                *(f"{row[name]:.4g}" for name in ("mean", "low", "high")),
-                str(row["seeds"]),
-            ]
-            for row in self.rows
-        ]
-        headers = ["Measure", "Mean", "Low", "High", "Seeds"]
-        headers = ["Configuration", *headers] if several else headers
-        return plain_text([Table("", headers, lines, text_columns=1 + several)], _WIDE)
+        lines = [["Configuration", "Measure", "Mean", "Low", "High", "Seeds"]]
+        for row in self.rows:
+            unit = f" ({row['unit']})" if row["unit"] else ""
+            numbers = [f"{row[name]:.4g}" for name in ("mean", "low", "high")]
+            measure = [f"{row['measure']}{unit}", *numbers, str(row["seeds"])]
+            lines.append([row["configuration"], *measure])
+        if is_one := len({row["configuration"] for row in self.rows}) < 2:
+            lines = [line[1:] for line in lines]
+        return plain_text([Table("", lines[0], lines[1:], text_columns=2 - is_one)], 100)
 
 
 @dataclass(frozen=True)

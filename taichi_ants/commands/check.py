@@ -13,26 +13,24 @@ import sys
 from itertools import chain
 
 from taichi_ants.studies import command_line
-from taichi_ants.studies.command_line import whole_number
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = command_line.Parser(__doc__)
-    add, many = parser.add_argument, whole_number(1, 1_000_000)
-    add("file", metavar="FILE", help="Python file with rules, observations or learners")
-    about = "number of drawn inputs of each rule"
-    add("--inputs", type=many, default=4000, metavar="N", help=about)
+    about = "Python file with rules, observations or learners"
+    parser.add_argument("file", metavar="FILE", help=about)
     return parser.parse_args(arguments)
 
 
 def run(settings: argparse.Namespace) -> None:
     """Try everything that the file registers."""
     from taichi_ants import learners, rules
+    from taichi_ants.engines.learner_check import fault_of
     from taichi_ants.errors import AntsError
     from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import observations
-    from taichi_ants.testing import check_learner, check_observation, check_rule
+    from taichi_ants.testing import check_observation, check_rule
 
     registries = rules, observations, learners
     before = [set(registry.names()) for registry in registries]
@@ -46,13 +44,12 @@ def run(settings: argparse.Namespace) -> None:
             f"the file {settings.file!r} registers no rules, observations or learners; register "
             "one, for example with taichi_ants.rules.register."
         )
-    of_rules = (check_rule(name, settings.inputs) for name in new[0])
     has_fault = False
-    for comparison in chain(of_rules, map(check_observation, new[1])):
+    for comparison in chain(map(check_rule, new[0]), map(check_observation, new[1])):
         print(comparison, flush=True)
         has_fault |= bool(comparison.difference)
     for name in new[2]:
-        fault = check_learner(name)
+        fault = fault_of(learners.get(name))
         print(f"{name}: 2000 steps: {fault or 'no fault'}", flush=True)
         has_fault |= bool(fault)
     if has_fault:

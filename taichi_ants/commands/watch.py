@@ -103,7 +103,7 @@ def run(settings: argparse.Namespace) -> None:
         def each_turn() -> None:
             if stopped():
                 room.end()
-            if room.watched:
+            if room.pages:
                 opened.close()
 
         with held() as stopped:

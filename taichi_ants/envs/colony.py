@@ -64,7 +64,7 @@ class ColonyWorlds(Ants):
         self.acted, self.rewards = np.zeros(shape, bool), np.zeros(shape)
         self.events = np.full(shape, Event.NONE, np.int64)
         self.deliveries = np.zeros(shape, np.int64)
-        self._last: dict[str, np.ndarray] = {}  # at the end of episodes, in mode SAME_STEP
+        self._last: dict[str, np.ndarray] = {}  # at the end of episodes
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
         new = np.array([seed is not None for seed in seeds]) & which
@@ -98,17 +98,12 @@ class ColonyWorlds(Ants):
             delivered = self.colony.events == Event.DELIVERED
             self.deliveries = np.where(delivered, 0, self.deliveries)
         self.step(actions.reshape(self.acted.shape))
-        over = self.over() & ~waiting
-        terminated = self.events == Event.DELIVERED
-        if self.task.delivery != "terminates":
-            terminated = np.zeros_like(terminated)
-        if self.mode is AutoresetMode.SAME_STEP and (over.any() or terminated.any()):
+        over = self.over()
+        terminated = (self.events == Event.DELIVERED) & (self.task.delivery == "terminates")
+        if over.any() or terminated.any():
             self._last = self.facts()
-        begins = over
-        if self.mode is not AutoresetMode.SAME_STEP:
-            begins = waiting & (self.mode is AutoresetMode.NEXT_STEP)
-        if begins.any():
-            self.begin(begins, [None] * len(begins))
+        if over.any():
+            self.begin(over, [None] * len(over))
         truncated = np.repeat(over, self.colony.capacity)
         return self.rewards.reshape(-1), terminated.reshape(-1), truncated
 
@@ -168,17 +163,18 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
     rewards of an ant's own action, and infos except `reason` are those of `HexForageVectorEnv`; its
     mask is 1 for actions that succeed unless another ant comes first.
 
-    After `max_steps` steps, all ants of a world are truncated, and all autoreset modes reset whole
-    worlds. After a delivery, the ant continues from its cell. If the task's `delivery` is
-    "terminates", the default, its next observation nevertheless begins its next episode, which
-    requires the mode `SAME_STEP`. If it is "truncates", no ant is terminated.
+    After `max_steps` steps, all ants of a world are truncated, and the world is reset. After a
+    delivery, the ant continues from its cell. If the task's `delivery` is "terminates", the
+    default, its next observation nevertheless begins its next episode. If it is "truncates", no
+    ant is terminated. The autoreset mode is `SAME_STEP`, because episodes of ants begin in the step
+    of a delivery.
 
     ## Arguments
     - `num_envs`: The number of ants in all worlds together, a multiple of `ants`.
     - `ants`: The number of ants in each world.
     - `task`: See `HexForageEnv`; without births and lifespan.
     - `start`, `max_steps`: See `HexColonyParallelEnv`.
-    - All others: See `HexForageVectorEnv`; `render` draws each ant's world.
+    - All others: See `HexForageEnv`; `render` draws each ant's world.
     """
 
     def __init__(
@@ -190,7 +186,6 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         start: str = "nest",
         max_steps: int = MAX_STEPS,
         observation_format: ObservationFormat = "cells",
-        autoreset_mode: str | AutoresetMode = AutoresetMode.SAME_STEP,
         render_mode: str | None = None,
     ) -> None:
         n, ants = checked_whole("num_envs", num_envs), checked_whole("ants", ants)
@@ -202,11 +197,4 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         # The number of ants is fixed.
         supports = SUPPORTS - {"life.births", "life.lifespan"}
         worlds = ColonyWorlds(n // ants, arguments, ants, start, supports=supports)
-        super().__init__(worlds, n, autoreset_mode)
-        same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
-        if worlds.task.delivery == "terminates" and not same_step:
-            raise AntsError(
-                f"autoreset_mode is {self.autoreset_mode.value!r}, but the next episode of an ant "
-                'begins in the step of its delivery; use "SameStep", or a task with delivery '
-                '"truncates".'
-            )
+        super().__init__(worlds, n, AutoresetMode.SAME_STEP)

@@ -96,16 +96,13 @@ class HexColonyParallelEnv(ParallelEnv):
         """
         if seed is not None:
             seeding.np_random(seed)  # raises Gymnasium's error for invalid seeds
-        elif not self._begun:
+        elif not self._worlds.begun:
             seed = int(np.random.default_rng().integers(2**63))
         self._worlds.begin(np.ones(1, bool), [seed])
+        self._worlds.begun = True
         self._slots = list(range(self._worlds.colony.ants))  # the slots of `agents`
         self.agents = self._names(self._slots)
         return self._told(self.agents, self._slots)
-
-    @property
-    def _begun(self) -> bool:
-        return self._worlds.colony.episode >= 0
 
     def step(
         self, actions: dict[str, int]
@@ -122,7 +119,7 @@ class HexColonyParallelEnv(ParallelEnv):
         Raises:
             AssertionError: No episode has begun, or an action is missing or does not exist.
         """
-        if not self._begun:
+        if not self._worlds.begun:
             EnvLogger.error_step_before_reset()
         if not self.agents:
             EnvLogger.warn_step_after_terminated_truncated()
@@ -164,7 +161,7 @@ class HexColonyParallelEnv(ParallelEnv):
 
     def render(self) -> np.ndarray | None:
         """Return a picture, uint8 (height, width, 3), or None without a render mode."""
-        if not self._begun:
+        if not self._worlds.begun:
             EnvLogger.error_render_before_reset()
         return None if self.render_mode is None else self._worlds.draw(0)
 

@@ -33,9 +33,9 @@ Step = tuple[np.ndarray, np.ndarray, np.ndarray]  # rewards, terminations, trunc
 def _action_masks() -> np.ndarray:
     masks = np.zeros((N_STATES, N_ACTIONS), np.int8)
     for paper_state, mask in enumerate(masks):
-        state = state_from_index(paper_state)
-        mask[:PICK_UP] = [code % 2 == 0 for code in state.view]  # E, T and S can be entered
-        mask[GIVE if state.carries else PICK_UP] = 3 in state.view
+        carries, *view = state_from_index(paper_state)
+        mask[:PICK_UP] = [code % 2 == 0 for code in view]  # E, T and S can be entered
+        mask[GIVE if carries else PICK_UP] = 3 in view
         if not mask.any():  # a dead end, in which moves turn the ant
             mask[:PICK_UP] = 1
     return masks

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, count
 from taichi_ants.features.feature import ANT, CASTE, Array, Feature, State, Task
 from taichi_ants.features.labour import Threshold
 from taichi_ants.features.life import Ticks
+from taichi_ants.grid.constants import MAX_CASTES, MAX_NESTS, TRAIL
 from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
     import numpy as np
 
-TRAIL = "trail"
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
-MAX_CASTES, MAX_NESTS = 16, 7
 Rate = Annotated[float | None, Setting(least=0, most=1)]
 Number = Annotated[int | None, Setting(least=0)]
 Temperature = Annotated[float | None, Setting(least=1e-6, most=1e6)]
@@ -30,10 +29,8 @@ class Caste(Settings, path="task.castes.NAME"):
     """A caste of ants, for colonies only.
 
     Ants of a caste share a table of action values, and can have their own numbers. None means that
-    they have those of the task, or of the training. A caste has a `share` of the ants of each nest,
-    or a number of `ants`; castes without both divide the remaining share equally. With a `policy`,
-    the ants of the caste follow it and do not learn. `threshold` can also be a number, which is a
-    fixed threshold.
+    they have those of the task, or of the training. Castes without `share` and `ants` divide the
+    remaining share equally. `threshold` can also be a number, which is a fixed threshold.
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -61,45 +58,32 @@ class Caste(Settings, path="task.castes.NAME"):
 
     most_entries = MAX_CASTES
 
-    share: Annotated[
-        Rate, Setting("share of the ants of a nest that `ants` does not give to castes")
-    ] = None
+    share: Annotated[Rate, Setting("share of the ants of a nest, after `ants` of castes")] = None
     ants: Annotated[
-        Number,
-        Setting("number of ants in each nest at the start, instead of a share", most=1 << 24),
+        Number, Setting("ants in each nest at the start, instead of a share", most=1 << 24)
     ] = None
-    nest: Annotated[
-        Number, Setting("number of the nest that has the caste; off: each nest", most=MAX_NESTS - 1)
-    ] = None
+    nest: Annotated[Number, Setting("number of its nest; off: each nest", most=MAX_NESTS - 1)] = (
+        None
+    )
     policy: Annotated[
-        str | None,
-        Setting(
-            "policy file, or the name of a hand-written policy, that the ants follow; off: learn"
-        ),
+        str | None, Setting("policy file, or name of a hand-written policy, to follow; off: learn")
     ] = None
     epsilon: Annotated[Rate, Setting("constant exploration rate")] = None
     epsilon_spread: Annotated[
-        Rate,
-        Setting("half the range of the exploration rates of the ants around `epsilon`", most=0.5),
+        Rate, Setting("half the range of exploration rates around `epsilon`", most=0.5)
     ] = None
     learning_rate: Annotated[Rate, Setting("constant learning rate", least=1e-37)] = None
     discount: Annotated[Rate, Setting("discount factor")] = None
     temperature: Annotated[Temperature, Setting("temperature of the rule softmax")] = None
-    k: Annotated[
-        Attraction, Setting("attraction of a cell without a trail, for the rule deneubourg")
-    ] = None
-    exponent: Annotated[
-        Exponent, Setting("exponent of the attraction of a cell, for the rule deneubourg")
-    ] = None
-    lays: Annotated[
-        str, Setting("pheromones that the ants lay: all, none, or names separated by commas")
-    ] = ALL
-    outbound_cue: Annotated[
-        str | None, Setting("pheromone that ants without food see as T; off: that of the task")
-    ] = None
-    homing_cue: Annotated[
-        str | None, Setting("what ants with food see as S; off: the cue of the task")
-    ] = None
+    k: Annotated[Attraction, Setting("attraction of a cell without a trail (deneubourg)")] = None
+    exponent: Annotated[Exponent, Setting("exponent of the attraction of a cell (deneubourg)")] = (
+        None
+    )
+    lays: Annotated[str, Setting("pheromones to lay: all, none, or names with commas")] = ALL
+    outbound_cue: Annotated[str | None, Setting("pheromone seen as T; off: that of the task")] = (
+        None
+    )
+    homing_cue: Annotated[str | None, Setting("cue seen as S; off: that of the task")] = None
     lifespan: Annotated[Ticks, Setting("age at which an ant dies; off: that of the task")] = None
     threshold: Annotated[Threshold, Setting("response thresholds of the ants")] = Threshold()
 
@@ -122,8 +106,8 @@ class Caste(Settings, path="task.castes.NAME"):
         return [name.strip() for name in self.lays.split(",")]
 
 
-def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
-    """Return the share of each caste in the ants of a nest that `ants` does not give to castes.
+def parts_in(castes: Mapping[str, Caste], nest: int) -> list[tuple[int, float]]:
+    """Return the `ants` of each caste of a nest, 0 without, and its share of all other ants there.
 
     AntsError if the nest has no caste, or shares do not add up to 1.
     """
@@ -140,18 +124,12 @@ def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
             f"the shares of `task.castes` in nest {nest} add up to {sum(shares):g}; they must add "
             "up to 1, or to less if another caste has neither `share` nor `ants`."
         )
-    equal = max(left, 0.0) / n_open if n_open else 0.0
-    return [
-        0.0
-        if caste.nest not in (None, nest) or caste.ants is not None
-        else (equal if caste.share is None else caste.share)
-        for caste in castes.values()
-    ]
-
-
-def _fixed_in(castes: Mapping[str, Caste], nest: int) -> list[int]:
-    """Return the number `ants` of each caste in a nest, 0 without one."""
-    return [(caste.ants or 0) * (caste.nest in (None, nest)) for caste in castes.values()]
+    equal, parts = max(left, 0.0) / max(n_open, 1), []
+    for caste in castes.values():
+        share = equal if caste.share is None else caste.share
+        part = (0, share) if caste.ants is None else (caste.ants, 0.0)
+        parts.append(part if caste.nest in (None, nest) else (0, 0.0))
+    return parts
 
 
 def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
@@ -163,15 +141,16 @@ def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
 
     AntsError if there are too few ants, or ants without a caste.
     """
-    shares, counts = shares_in(castes, nest), _fixed_in(castes, nest)
-    rest = n - sum(counts)
-    if rest < 0 or (rest > 0 and not any(shares)):
+    parts = parts_in(castes, nest)
+    given = sum(ants for ants, _ in parts)
+    rest = n - given
+    if rest < 0 or (rest > 0 and not any(share for _, share in parts)):
         raise AntsError(
-            f"the castes have {sum(counts)} ants in nest {nest}, but {n} ants start there; change "
+            f"the castes have {given} ants in nest {nest}, but {n} ants start there; change "
             "`ants` of a caste, or give a caste a share."
         )
-    quotas = [round(share * rest, 9) for share in shares]
-    counts = [ants + int(quota) for ants, quota in zip(counts, quotas, strict=True)]
+    quotas = [round(share * rest, 9) for _, share in parts]
+    counts = [ants + int(quota) for (ants, _), quota in zip(parts, quotas, strict=True)]
     order = sorted(range(len(quotas)), key=lambda i: int(quotas[i]) - quotas[i])
     for i in order[: n - sum(counts)]:
         counts[i] += 1
@@ -183,9 +162,9 @@ def chances_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[float]:
 
     That is the caste's share, or its `ants` divided by n.
     """
-    shares, fixed, most = shares_in(castes, nest), _fixed_in(castes, nest), max(n, 1)
-    rest = (n - sum(fixed)) / most if n else 1.0
-    return [ants / most + share * rest for ants, share in zip(fixed, shares, strict=True)]
+    parts, most = parts_in(castes, nest), max(n, 1)
+    rest = (n - sum(ants for ants, _ in parts)) / most if n else 1.0
+    return [ants / most + share * rest for ants, share in parts]
 
 
 def _columns(state: State) -> dict[str, np.ndarray]:
@@ -201,19 +180,77 @@ def _columns(state: State) -> dict[str, np.ndarray]:
     return {"caste": castes}
 
 
+def numbers_of_castes(features: tuple[Feature, ...]) -> dict[str, Any]:
+    """Return the numbers of castes that features declare, by name, in order."""
+    return {name: of for feature in features for name, of in feature.of_castes.items()}
+
+
 def _constants(state: State) -> dict[str, np.ndarray]:
-    """Return the probabilities of the castes of newborn ants, and scratch counts of deliveries."""
+    """Return the numbers and update weights of castes, chances of newborn ants, and scratch."""
     import numpy as np
 
-    nests, chances = state.nests_at_start, []
+    nests, chances, castes = state.nests_at_start, [], state.task.castes.values()
     for w, nest in np.ndindex(len(nests), state.n_nests):
         n = int(np.count_nonzero(nests[w] == nest))
         chances.append(np.cumsum(chances_in(state.task.castes, nest, n)))
+    rows = numbers_of_castes(state.model.features).values()
+    weights = [state.update_weights(caste.learning_rate or 0.0) for caste in castes]
+    longest = max(map(len, weights))
     return {
+        # By number and caste, f64.
+        "castes": np.array([[of(state.task, caste) for caste in castes] for of in rows], float),
+        # By caste and n, see `update_weights`; unused without an own learning rate.
+        "caste_weights": np.stack(
+            [np.pad(one, (0, longest - len(one)), mode="edge") for one in weights]
+        ),
         # By world, nest and caste: cumulative.
         "caste_chances": np.concatenate(chances),
         "delivered_by_caste": np.zeros(len(nests) * state.chunks * MAX_CASTES, np.int32),
     }
+
+
+def update_weights_of(state: State, castes: np.ndarray, ants: np.ndarray) -> np.ndarray:
+    """Return the weight of the mean error of several ants of a caste in an update.
+
+    Arrays (n,), int and float64. Castes that do not learn have the weight 0.
+    """
+    import numpy as np
+
+    weights = state.arrays["weights"]
+    weights = weights[np.minimum(ants, len(weights) - 1)]
+    if not state.task.castes:
+        return weights
+    own, numbers = state.arrays["caste_weights"], state.arrays["castes"][:, castes]
+    numbers = dict(zip(CASTES.of_castes, numbers, strict=False))
+    of_castes = own[castes, np.minimum(ants, own.shape[1] - 1)]
+    weights = np.where(numbers["learning_rate"] >= 0, of_castes, weights)
+    return np.where(numbers["learns"] == 1, weights, 0.0)
+
+
+def _refusals(state: State) -> Iterator[str]:
+    for name, caste in state.task.castes.items():
+        if caste.nest is not None and caste.nest >= state.n_nests:
+            yield (
+                f"`task.castes.{name}.nest` is {caste.nest}, but the world has "
+                f"{count(state.n_nests, 'nest')}, numbered from 0; choose one of them."
+            )
+        if caste.policy is not None and state.sharing == "independent":
+            yield (
+                f"`task.castes.{name}.policy` is {caste.policy!r}, but sharing is "
+                '"independent", so each ant learns into its own table; set sharing to "shared" or '
+                '"frozen".'
+            )
+
+
+def _newborn(state: State, w: int, nests: np.ndarray, draw: Callable[[int], np.ndarray]) -> Any:
+    """Return the castes of newborn ants of some nests (n,), each by a draw."""
+    import numpy as np
+
+    if len(state.task.castes) == 1:
+        return {}
+    drawn = (draw(len(nests)) >> np.uint64(32)) / 2.0**32
+    bounds = state.part("caste_chances", w).reshape(state.n_nests, -1)[nests, :-1]
+    return {"caste": np.count_nonzero(bounds <= drawn[:, None], axis=1)}
 
 
 def _lays(task: Task, caste: Caste) -> int:
@@ -254,4 +291,6 @@ CASTES = Feature(
     ),
     columns=_columns,
     constants=_constants,
+    refusals=_refusals,
+    newborn=_newborn,
 )

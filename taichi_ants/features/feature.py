@@ -28,26 +28,31 @@ State = Any  # a `ColonyState`
 
 
 class Array(NamedTuple):
-    """An array of a colony by ant, or by world and nest or caste, 0 at the start of an episode.
+    """An array of a colony by ant, or by world and nest or caste.
 
     Attributes:
         name: Its name in hooks; that of the array in kernels, and in files.
         per: ANT, NEST or CASTE.
         dtype: The type in kernels; "i1", "i4" or "f4" per ant.
-        view: Its name as an attribute of a colony, and of a snapshot with "ant_" in front.
-        shown_as: The type there.
+        view: Its name as an attribute of a colony; of a feature, also that of a snapshot, with
+            "ant_" in front. "" if it has none.
+        shown_as: The type of the attribute, which is a copy; "" for a writable view.
         words, values, unit: The name, the values and the unit in the description of a model, which
             leaves out arrays without a name.
+        start: The value at the start of an episode, and where no ant is.
+        instead: The array that the attribute shows if a colony does not need this one; "" for 0.
     """
 
     name: str
     per: str
     dtype: str
-    view: str
-    shown_as: str
+    view: str = ""
+    shown_as: str = ""
     words: str = ""
     values: str = "at least 0"
     unit: str = ""
+    start: int = 0
+    instead: str = ""
 
 
 class Mark(NamedTuple):
@@ -73,19 +78,15 @@ class Mark(NamedTuple):
         return np.rint(255 * shares).astype(np.uint8)
 
 
-class Measured(NamedTuple):
-    """A measure of the ants: a function of a `Snapshot`, the unit, and words."""
-
-    function: Function
-    unit: str
-    words: str
-
-
 class Input(NamedTuple):
-    """An input of your rules: its meaning, and its number of entries if it is a vector, else 0."""
+    """An input of your rules: its meaning, and its number of entries if it is a vector, else 0.
+
+    `by_deliveries` says whether it changes with the deliveries of a tick before ants observe.
+    """
 
     meaning: str
     length: int = 0
+    by_deliveries: bool = False
 
 
 @dataclass(eq=False, frozen=True, repr=False)
@@ -97,7 +98,6 @@ class Feature:
         switch: The setting of which the default means that a task does not use the feature; by
             default all settings of the group.
         uses: A function of a task that says whether it uses the feature, instead of the switch.
-        kills: Whether ants can die by it, so that slots become vacant.
         runs_alone: Whether lone ants have the feature, too.
         arrays: The arrays that it adds to the state of a colony.
         numbers: Settings that hooks read as `a.task.GROUP.SETTING`, f64.
@@ -108,19 +108,20 @@ class Feature:
         columns: A function of a colony that returns the arrays (W, ants) of ants that start, where
             these are not 0.
         constants: A function of a colony that returns further arrays of its kernels.
+        refusals: A function of a colony that yields why it cannot be, as sentences.
+        newborn: A function of a colony, a world, the nests (n,) of ants that an intervention adds,
+            and a function that draws n words. It returns their arrays (n,) where these are not 0.
         faults: A function of a task that yields what is wrong with it, as sentences.
         example: Settings of a task that uses the feature.
-        measures: Its measures by name.
+        measures: Its measures by name: a function of a `Snapshot`, the unit, and words.
         marks: The marks by which pages show its arrays of ants.
         hooks: Its hooks by the names of points.
         inputs: Inputs of your rules by name, with the functions of an ant that return them.
-        by_deliveries: The inputs that change with the deliveries of a tick before ants observe.
     """
 
     settings: type[Settings]
     switch: str = ""
     uses: Callable[[Task], bool] | None = None
-    kills: bool = False
     runs_alone: bool = False
     arrays: tuple[Array, ...] = ()
     numbers: tuple[str, ...] = ()
@@ -129,13 +130,14 @@ class Feature:
     fixed: Callable[[Caste], Any] = lambda caste: None
     columns: Callable[[State], Mapping[str, Any]] = lambda state: {}
     constants: Callable[[State], Mapping[str, Any]] = lambda state: {}
+    refusals: Callable[[State], Iterator[str]] = lambda state: iter(())
+    newborn: Callable[..., Mapping[str, Any]] = lambda state, w, nests, draw: {}
     faults: Callable[[Task], Iterator[str]] = lambda task: iter(())
     example: Mapping[str, Any] = field(default_factory=dict)
-    measures: Mapping[str, Measured] = field(default_factory=dict)
+    measures: Mapping[str, tuple[Function, str, str]] = field(default_factory=dict)
     marks: tuple[Mark, ...] = ()
     hooks: dict[str, KernelFunction] = field(default_factory=dict)
     inputs: dict[str, tuple[Input, KernelFunction]] = field(default_factory=dict)
-    by_deliveries: set[str] = field(default_factory=set)
 
     @property
     def group(self) -> str:
@@ -164,7 +166,7 @@ class Feature:
         """Register a function as the hook at a point, as a decorator."""
 
         def register(body: Function) -> KernelFunction:
-            given, expected = " ".join(signature(body).parameters), POINTS[point].arguments
+            given, expected = " ".join(signature(body).parameters), POINTS[point]
             if given != expected:
                 raise TypeError(f"{body.__name__} has ({given}), but {point} needs ({expected})")
             self.hooks[point] = KernelFunction(body)
@@ -176,10 +178,8 @@ class Feature:
         """Register a function of an ant as an input of your rules, as a decorator."""
 
         def register(body: Function) -> KernelFunction:
-            name, words = body.__name__, f"{meaning}; needs `{self.settings.path}`"
-            self.inputs[name] = Input(words), KernelFunction(body)
-            if by_deliveries:
-                self.by_deliveries.add(name)
-            return self.inputs[name][1]
+            read = Input(f"{meaning}; needs `{self.settings.path}`", by_deliveries=by_deliveries)
+            self.inputs[body.__name__] = read, KernelFunction(body)
+            return self.inputs[body.__name__][1]
 
         return register

@@ -26,7 +26,7 @@ from numbers import Real
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from taichi_ants.errors import is_flag
-from taichi_ants.features.feature import ANT, NEST, Array, Feature, Mark, Measured, Task
+from taichi_ants.features.feature import ANT, NEST, Array, Feature, Mark, Task
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_TRAIT
 from taichi_ants.kernel_functions import bits, numbers, ti
 from taichi_ants.settings import Setting, Settings
@@ -44,11 +44,7 @@ _NONE, _FIXED, _UNIFORM, _NORMAL, _LOGNORMAL = range(len(DISTRIBUTIONS))
 class Labour(Settings, path="task.labour"):
     """The rule by which ants start and stop foraging; by default, they always forage.
 
-    With "thresholds", after Bonabeau, Theraulaz and Deneubourg (1996), each nest has a stimulus. It
-    rises by `demand` in each tick and falls by `relief` with each delivery, but not below 0. An
-    idle ant with the threshold t starts foraging with the probability s^n / (s^n + t^n) per tick,
-    for a stimulus s and n = `exponent`. A forager without food next to its queen becomes idle with
-    the probability `stop_probability` per tick. See `docs/colony.md`.
+    `sentences` describe the rule "thresholds". See `docs/colony.md`.
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -62,19 +58,13 @@ class Labour(Settings, path="task.labour"):
 
     rule: Annotated[LabourRule, Setting("rule by which ants start and stop foraging")] = "none"
     demand: Annotated[
-        Stimulus,
-        Setting("rise of the stimulus of each nest", unit="units of stimulus per tick", usual=1.0),
-        _DIVIDES,
+        Stimulus, Setting("rise of the stimulus per tick", unit=_UNIT, usual=1.0), _DIVIDES
     ] = None
     relief: Annotated[
-        Stimulus,
-        Setting("fall of the stimulus with each delivery", unit=_UNIT, usual=10.0),
-        _DIVIDES,
+        Stimulus, Setting("fall of the stimulus per delivery", unit=_UNIT, usual=10.0), _DIVIDES
     ] = None
     exponent: Annotated[
-        float | None,
-        Setting("exponent of the response to the stimulus; larger values make it steeper"),
-        Setting(least=0, most=20, usual=2.0, only=("rule", "thresholds")),
+        float | None, Setting("exponent of the response", least=0, most=20, usual=2.0), _DIVIDES
     ] = None
     stop_probability: Annotated[
         float | None,
@@ -90,20 +80,10 @@ class Labour(Settings, path="task.labour"):
 
 @dataclass(frozen=True)
 class Threshold(Settings, path="task.castes.NAME.threshold"):
-    """The distribution of the response thresholds of a caste; by default, it has none.
-
-    - "fixed": all ants have the threshold `value`.
-    - "uniform": thresholds lie between `value` - `spread` and `value` + `spread`.
-    - "normal": `value` is the mean and `spread` the standard deviation. Values below 0 are drawn
-      again.
-    - "lognormal": `value` is the median and `spread` the standard deviation of the logarithm.
-    """
+    """The distribution of the response thresholds of a caste, by default none; see the module."""
 
     distribution: Annotated[
-        Distribution,
-        Setting(
-            "distribution of thresholds over the ants of the caste; with none, they always forage"
-        ),
+        Distribution, Setting("distribution of the thresholds; none: the ants always forage")
     ] = "none"
     value: Annotated[
         Stimulus,
@@ -186,9 +166,7 @@ LABOUR = Feature(
         "castes": {"ants": {"threshold": {"distribution": "uniform", "value": 5.0, "spread": 5.0}}},
     },
     marks=(Mark("idle", "idle"),),
-    measures={
-        "foraging": Measured(_foraging, "", "share of the ants that forage, which are not idle")
-    },
+    measures={"foraging": (_foraging, "", "share of the ants that forage, which are not idle")},
 )
 
 

@@ -34,23 +34,16 @@ class Life(Settings, path="task.life"):
         "ticks.",
     }
 
-    births: Annotated[bool, Setting("turn each food item that the queen receives into an ant")] = (
-        False
-    )
+    births: Annotated[bool, Setting("turn each food item given to the queen into an ant")] = False
     lifespan: Annotated[Ticks, Setting("age at which an ant dies")] = None
-    regrowth: Annotated[Ticks, Setting("time until taken food grows back in its cell", least=0)] = (
-        None
-    )
-    pile_move_interval: Annotated[
-        Ticks, Setting("interval at which each pile of food moves by one cell")
-    ] = None
+    regrowth: Annotated[Ticks, Setting("time until taken food grows back", least=0)] = None
+    pile_move_interval: Annotated[Ticks, Setting("time between moves of each pile of food")] = None
 
 
 AGE = Feature(
     Life,
     switch="lifespan",
     uses=lambda task: any(one.lifespan is not None for one in (task.life, *task.castes.values())),
-    kills=True,
     arrays=(Array("age", ANT, "i4", "ages", "i4", "age", unit="ticks"),),
     of_castes={"lifespan": lambda task, caste: caste.lifespan or task.life.lifespan or -1},
 )

@@ -34,12 +34,8 @@ class Noise(Settings, path="task.noise"):
         "codes.",
     }
 
-    slip: Annotated[
-        Share, Setting("probability that an ant executes a random action instead of the chosen one")
-    ] = 0.0
-    misread: Annotated[
-        Share, Setting("probability with which a cell in view is seen as another of the four codes")
-    ] = 0.0
+    slip: Annotated[Share, Setting("probability that an ant executes a random action")] = 0.0
+    misread: Annotated[Share, Setting("probability that a cell is seen as another code")] = 0.0
 
 
 SLIP = Feature(Noise, switch="slip", probabilities=("slip",), runs_alone=True)

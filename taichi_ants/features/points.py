@@ -1,55 +1,39 @@
 """The points of a tick at which hooks of features run, in the order of a tick.
 
-An argument `a` is an ant and `nest` a nest: hooks read and write their values by name, for example
-`a.idle`. The name of an array or of a number means that of the ant's nest or caste if there is one
-for each nest or caste. All hooks of a point run in the order of `FEATURES`.
+A point has the names of the arguments of its hooks. An argument `a` is an ant and `nest` a nest:
+hooks read and write their values by name, for example `a.idle`. The name of an array or of a number
+means that of the ant's nest or caste if there is one for each nest or caste. All hooks of a point
+run in the order of `FEATURES`.
 """
 
-from typing import NamedTuple
-
-
-class Point(NamedTuple):
-    """A point: the names of the arguments of its hooks, and when they run and what they return."""
-
-    arguments: str
-    meaning: str
-
-
 POINTS = {
-    "born": Point("a", "An ant begins: at the start, by a birth, or by an intervention."),
-    "choose": Point(
-        "a stream",
-        "An ant is about to choose an action. The hook returns 1 if the ant rests in this tick, "
-        "else 0, and the random stream. It rests if one of the hooks returns 1.",
-    ),
-    "execute": Point(
-        "a action stream",
-        "An ant that does not rest is about to execute the action of the hook before, at first the "
-        "chosen one. The hook returns an action and the random stream.",
-    ),
-    "rests": Point(
-        "a",
-        "The hook returns 1 if the ant rests, else 0, in the tick after `choose`. What one hook "
-        "says is enough: the ant then has no event and no reward, lays nothing and does not learn.",
-    ),
-    "delivered": Point("nest n", "A nest has received n food items in this tick."),
-    "gave": Point("a", "An ant has delivered its food in this tick."),
-    "aged": Point(
-        "a",
-        "Ants have acted, and newborn ants have their places. The hook returns whether the ant "
-        "dies; one of the hooks is enough. A dying ant still learns in this tick.",
-    ),
-    "acted": Point(
-        "a",
-        "All ants have acted, and this one, which does not rest, is about to observe. The hook "
-        "returns whether the ant stops after it has learned; one of the hooks is enough.",
-    ),
-    "stopped": Point("a", "An ant that stops has learned from its last action."),
-    "see": Point(
-        "a code stream",
-        "An ant is about to observe a cell in view, which shows the code of the hook before, at "
-        "first the true one: 0 to 3, see `taichi_ants.task.constants`. The hook returns the code "
-        "that the ant sees, and the random stream.",
-    ),
-    "tick_ended": Point("nest", "A tick ends."),
+    # An ant begins: at the start, by a birth, or by an intervention.
+    "born": "a",
+    # An ant is about to choose an action. The hook returns 1 if the ant rests in this tick, else 0,
+    # and the random stream. It rests if one of the hooks returns 1.
+    "choose": "a stream",
+    # An ant that does not rest is about to execute the action of the hook before, at first the
+    # chosen one. The hook returns an action and the random stream.
+    "execute": "a action stream",
+    # The hook returns 1 if the ant rests, else 0, in the tick after `choose`. One hook is enough:
+    # the ant then has no event and no reward, lays nothing and does not learn.
+    "rests": "a",
+    # A nest has received n food items in this tick.
+    "delivered": "nest n",
+    # An ant has delivered its food in this tick.
+    "gave": "a",
+    # Ants have acted, and newborn ants have their places. The hook returns whether the ant dies;
+    # one of the hooks is enough. A dying ant still learns in this tick.
+    "aged": "a",
+    # All ants have acted, and this one, which does not rest, is about to observe. The hook returns
+    # whether the ant stops after it has learned; one of the hooks is enough.
+    "acted": "a",
+    # An ant that stops has learned from its last action.
+    "stopped": "a",
+    # An ant is about to observe a cell in view, which shows the code of the hook before, at first
+    # the true one: 0 to 3, see `taichi_ants.task.constants`. The hook returns the code that the ant
+    # sees, and the random stream.
+    "see": "a code stream",
+    # A tick ends.
+    "tick_ended": "nest",
 }

@@ -33,8 +33,7 @@ CASTES = frozenset({"castes"})
 OWN_RULES = frozenset({"rules", "reward"})
 # Of a colony, without what only colonies have of the features of the model.
 BASE = LONE | CHOICE | FIELDS | FOODS | CASTES | OWN_RULES
-BASE |= {"pheromone.evaporation", "pheromone.half_life", "pheromone.diffusion"}
-BASE |= {"pheromone.deposit", "nests"}
+BASE |= {"pheromone", "nests"}
 BASE |= {"life.births", "life.lifespan", "life.regrowth", "life.pile_move_interval"}
 COLONY = BASE | {feature.group for feature in FEATURES}
 

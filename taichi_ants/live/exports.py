@@ -11,10 +11,9 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
 from multiprocessing.connection import Connection
 from typing import Any
-
-import numpy as np
 
 from taichi_ants.errors import AntsError
 from taichi_ants.live.session import Log, Session, bytes_of
@@ -22,7 +21,6 @@ from taichi_ants.viewer import Recording, page
 
 Snapshots = Iterable[tuple[Session, bytes]]  # of a replay, see `Session.snapshots`
 
-_PROGRESS_EVERY = 0.1  # seconds
 _SLICE = 0.05  # seconds of a replay per turn of the server
 LOAD = "load"  # pages' name for a replay: of an uploaded file, or to undo a change
 
@@ -35,15 +33,13 @@ def recording(snapshots: Snapshots) -> Recording:
 
 def gif_bytes(snapshots: Snapshots) -> bytes:
     """Return a GIF of a session."""
-    from taichi_ants.rendering import Scene, colony_snapshots, save_animation
+    from taichi_ants.rendering import colony_snapshots, frames, save_animation
 
-    def pictures() -> Iterator[np.ndarray]:
-        scene = None
-        for session, _ in snapshots:
-            scene = scene or Scene(session.colony.grid, task=session.setup.task)
-            yield scene.draw(*next(colony_snapshots(session.colony)))
-
-    return bytes_of("session.gif", lambda path: save_animation(path, pictures(), fps=12.0))
+    snapshots = iter(snapshots)
+    session, _ = next(snapshots)  # it advances
+    shown = (next(colony_snapshots(session.colony)) for _ in chain([None], snapshots))
+    pictures = frames(shown, task=session.setup.task)
+    return bytes_of("session.gif", lambda path: save_animation(path, pictures, fps=12.0))
 
 
 # Pages' names of files, file names, and the functions that make them.
@@ -135,12 +131,9 @@ def _make(
     _, make, most = SLOW[kind]
 
     def passed() -> Snapshots:
-        told = 0.0
         for session, frame in Session.snapshots(Log.read("the session", content), most):
             yield session, frame
-            if time.monotonic() - told > _PROGRESS_EVERY:
-                told = time.monotonic()
-                answers.send(session.ticks)
+            answers.send(session.ticks)
 
     try:
         if prepare is not None:

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 from taichi_ants.errors import AntsError, imported
-from taichi_ants.live.choices import Choices
+from taichi_ants.live.choices import Choices, sliders
 from taichi_ants.live.exports import LOAD, QUICK, SLOW, Export, Replay
 from taichi_ants.live.session import Log, Session
 from taichi_ants.viewer.page import assemble, part
@@ -44,9 +44,7 @@ HOST = "127.0.0.1"
 FRAMES_A_SECOND = 30
 FASTEST = 1000.0  # ticks/s; at this speed the session runs as fast as possible
 
-_MOST_PAGES = 24
-_MOST_TEXT = 2**18  # bytes of a request
-_MOST_UPLOAD = 2**22  # bytes of a session file
+_MOST_UPLOAD = 2**22  # bytes of a session file, or another request
 _MOST_IN_FLIGHT = 12  # frames sent to a page before it has drawn the first of them
 _FEW = 4  # with fewer frames per episode, each frame shows another episode
 _PHASES = 24  # number of such frames that together show the course of an episode
@@ -145,8 +143,7 @@ class SessionServer:
         self.token = secrets.token_urlsafe(24)
         self.playing, self.speed = playing, 12.0
         self._shown = secrets.token_hex(8)  # identifies the session for pages that reconnect
-        self._pages: set[Page] = set()
-        self._joined = 0  # sockets, including those that have not received a session yet
+        self.pages: set[Page] = set()  # that are open
         self._engine = ThreadPoolExecutor(1, "session")
         self._turns = asyncio.Lock()  # for turns and requests, which use or change the session
         self._over = threading.Event()
@@ -163,11 +160,6 @@ class SessionServer:
     def url(self) -> str:
         """The address of the page, with the token."""
         return f"http://{HOST}:{self.port}/?token={self.token}"
-
-    @property
-    def watched(self) -> bool:
-        """Whether a page is open."""
-        return bool(self._pages)
 
     def end(self) -> None:
         """Make `run` return soon; can be called from any thread."""
@@ -216,7 +208,7 @@ class SessionServer:
 
     async def _turn(self) -> None:
         """Advance by a frame if one is due, continue jobs, and send the state from time to time."""
-        runs = self._runs and bool(self._pages)  # pause if no page is open
+        runs = self._runs and bool(self.pages)  # pause if no page is open
         now = time.monotonic()
         if now >= self._next_state:
             interval = _PROGRESS_EVERY if self._jobs else _STATE_EVERY if runs else math.inf
@@ -313,7 +305,7 @@ class SessionServer:
             case {"do": "speed", "value": int(speed) | float(speed)} if 1 <= speed <= FASTEST:
                 self.speed, self._due = float(speed), time.monotonic()  # ticks/s
             case {"do": "edit", "edit": dict(edit), "stroke": int(number)}:
-                # See `edits`; the number is equal for edits of one stroke.
+                # See `interventions`; the number is equal for edits of one stroke.
                 stroke = page, number
                 self._show(await self._work(self.session.apply, edit, stroke == self._stroke))
                 self._stroke = stroke
@@ -358,12 +350,12 @@ class SessionServer:
         """
         before = self.session
         in_a_row = undoes and self._undone == (before.steps, len(before.edits))
-        if comes_back or not (in_a_row or before.same(session)):
+        if comes_back or not (in_a_row or before.to_bytes() == session.to_bytes()):
             self._previous = before
         self._undone = (session.steps, len(session.edits)) if undoes else None
         self.session, self._shown = session, secrets.token_hex(8)
         self.playing, self._frame_steps, self._stroke = False, 1.0, None
-        self._send_whole(self._pages)
+        self._send_whole(self.pages)
 
     def _send_whole(self, pages: Iterable[Page], begins: bool = True) -> None:
         """Send a complete frame to pages; with `begins`, also facts of the session."""
@@ -382,9 +374,7 @@ class SessionServer:
 
     def _show(self, frame: bytes) -> None:
         """Send a frame to all pages except those that are behind."""
-        if new_names := self.session.recorder.new_names():
-            self._send(_message("names", names=new_names))
-        for page in self._pages:
+        for page in self.pages:
             page.show(frame)
 
     def _state(self) -> str:
@@ -396,17 +386,17 @@ class SessionServer:
             "state",
             playing=self._runs,
             speed=self.speed,
-            pages=len(self._pages),
+            pages=len(self.pages),
             ticks=session.ticks,
             can_undo=bool(session.changes),
             can_go_back=self._previous is not None,
-            values=session.values(),
+            values={name: v._asdict() for name, v in sliders(session.interventions).items()},
             works=works + [{"kind": "kernels", "done": 0, "total": 0}] * self._compiles,
         )
 
     def _send(self, *messages: str | bytes, to: Page | None = None) -> None:
         """Send messages to a page, or to all."""
-        for page in [to] if to else self._pages:
+        for page in [to] if to else self.pages:
             page.send(*messages)
 
     def _open(self, connection: ServerConnection, request: Request) -> Response | None:
@@ -428,9 +418,7 @@ class SessionServer:
         elif not mine or not (knows or (url.path == "/" and not tokens)):
             response = connection.respond(403, "Open the address that the command printed.\n")
         elif opens:
-            if self._joined < _MOST_PAGES:
-                return None
-            response = connection.respond(503, "Too many pages are open.\n")
+            return None
         elif url.path != "/":
             response = connection.respond(404, "This page does not exist.\n")
         else:
@@ -446,10 +434,9 @@ class SessionServer:
         from websockets.exceptions import ConnectionClosed
 
         page = Page(connection)
-        self._joined += 1
         try:
             async with self._turns:
-                self._pages.add(page)
+                self.pages.add(page)
                 self._send_whole([page])
                 self._send_state_soon()
             async for message in connection:
@@ -465,8 +452,7 @@ class SessionServer:
         except ConnectionClosed:
             pass
         finally:
-            self._joined -= 1
-            self._pages.discard(page)
+            self.pages.discard(page)
             async with self._turns:  # cancel the files that this page has asked for
                 for kind in [kind for kind, job in self._jobs.items() if job.page is page]:
                     self._jobs.pop(kind).cancel()
@@ -478,9 +464,9 @@ def _message(kind: str, /, **facts: Any) -> str:
 
 
 def _read(message: str | bytes) -> Any:
-    """Return the request in a message of a page, None if it is too long or not JSON."""
+    """Return the request in a message of a page, None if it is not JSON."""
     if isinstance(message, bytes):
         return {"do": "load", "content": message}
     with contextlib.suppress(ValueError, RecursionError):
-        return json.loads(message) if len(message) <= _MOST_TEXT else None
+        return json.loads(message)
     return None

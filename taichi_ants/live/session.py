@@ -16,12 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import files
+from taichi_ants import files, interventions
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.files.archives import Kind
 from taichi_ants.learners.policies import save_policy
-from taichi_ants.live import edits
 from taichi_ants.live.setup import Setup, check_most
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import Recorder
@@ -47,7 +46,7 @@ class Log:
     """The setup and all edits of a session up to some step, from which it can be replayed."""
 
     setup: Setup
-    edits: tuple[tuple[int, Any], ...]  # (steps, edit), in order, see `edits`
+    edits: tuple[tuple[int, Any], ...]  # (steps, edit), in order, see `taichi_ants.interventions`
     steps: int  # see `Session`
     ticks: int | None  # see `Session`; None if unknown
     state: str | None  # `Interventions.state` at the end; None if unknown
@@ -106,7 +105,7 @@ class Session:
         expect("setup", setup, Setup)
         self.setup, self.colony = setup, setup.build_colony()
         self.interventions = Interventions(self.colony)
-        self.edits: list[tuple[int, edits.Edit]] = []
+        self.edits: list[tuple[int, dict[str, Any]]] = []
         self.changes: list[int] = []
         self._cells = 0  # in all edits
         self._begun = 0  # episodes that began after one had ended
@@ -165,17 +164,18 @@ class Session:
         return frame
 
     def apply(self, edit: object, goes_on: bool = False) -> bytes:
-        """Return a frame of changes after applying and recording an edit, see `edits`.
+        """Return a frame of changes after applying and recording an edit.
 
-        An edit that affects only an ended episode is lost when the next one begins. An edit that
-        `goes_on` belongs to the same change as the previous edit, see `undone`. Raises AntsError if
-        the edit is not valid or not possible; nothing has changed.
+        An edit maps the name of an intervention to its settings or its short form. If it affects
+        only an ended episode, it is lost when the next one begins. An edit that `goes_on` belongs
+        to the same change as the previous edit, see `undone`. Raises AntsError if the edit is not
+        valid or not possible; nothing has changed.
         """
         self._do(edit, goes_on)
         return self.recorder.snapshot()
 
     def _do(self, edit: object, goes_on: bool = False) -> None:
-        intervention = edits.checked(edit, self.interventions)
+        intervention = interventions.from_dict(edit)
         plain = intervention.facts()
         check_most("edits", len(self.edits) + 1)
         check_most("cells in all edits", self._cells + cells_of(plain))
@@ -211,10 +211,6 @@ class Session:
         self._snapshot_time = now
         while sum(len(content) for _, content in self._snapshots) > _MOST_KEPT:
             del self._snapshots[0]
-
-    def values(self) -> dict[str, dict[str, Any]]:
-        """Return the values that sliders can change, by name, see `edits.Value`."""
-        return {name: value._asdict() for name, value in edits.values(self.interventions).items()}
 
     def log(self) -> Log:
         """Return the log: the setup, the edits, and the state at the end."""
@@ -268,11 +264,6 @@ class Session:
         self.changes = list(changes)
         self.recorder.snapshot()
         yield self
-
-    def same(self, other: Session) -> bool:
-        """Return whether both sessions have the same setup, edits and state."""
-        mine, others = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
-        return mine == others and self.interventions.state() == other.interventions.state()
 
     def undone(self) -> tuple[Iterator[Session], int]:
         """Return an iterator like `replay` that ends before the last change, and its steps then.
@@ -329,19 +320,18 @@ class Session:
 
     def policy_bytes(self) -> bytes:
         """Return the bytes of a policy file; raise AntsError if ants have several tables."""
-        colony, table = self.colony, self.colony.q_values[0]
-        no_table, learns = not colony.task.choice.needs_table, self.setup.learns
-        if no_table or colony.one_a_slot or (colony.n_nests > 1 and learns):
+        colony, learns = self.colony, self.setup.learns
+        tables = colony.q_values[0].reshape(-1, colony.task.n_states, N_ACTIONS)
+        no_table = not colony.task.choice.needs_table
+        if no_table or (len(tables) > 1 and learns):
             raise AntsError(
                 f"ants have {'no table' if no_table else 'several tables'}, but a policy file "
                 "holds a single one; export the colony instead."
             )
-        if colony.n_nests > 1:
-            table = table[0]  # all nests follow the same policy
         metadata = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
         if learns:
             metadata["training"] = colony.training.as_dict()
-        arguments = (table, metadata, colony.task.observation)
+        arguments = (tables[0], metadata, colony.task.observation)
         return bytes_of("policy.npz", lambda path: save_policy(path, *arguments))
 
     def colony_bytes(self) -> bytes:

@@ -6,8 +6,7 @@ your own. docs/measures.md lists the built-in ones.
 
 from taichi_ants.measures.built_in import BUILT_IN, shortest_path
 from taichi_ants.measures.finished import Run
-from taichi_ants.measures.measure import Measure
-from taichi_ants.measures.registry import get, names, register
+from taichi_ants.measures.measure import Measure, get, names, register
 from taichi_ants.measures.series import Series
 
 __all__ = ["BUILT_IN", "Measure", "Run", "Series", "get", "names", "register", "shortest_path"]

@@ -14,7 +14,7 @@ import numpy as np
 
 from taichi_ants.errors import AntsError
 from taichi_ants.features import FEATURES
-from taichi_ants.measures.measure import COUNTS, Measure
+from taichi_ants.measures.measure import COUNTS, MEASURES, Measure
 from taichi_ants.task.constants import FOOD, OBSTACLE, QUEEN
 from taichi_ants.task.events import Event
 
@@ -169,3 +169,4 @@ _LISTED = (
     Measure("regions", _regions, "", "share of the ants in each region of the world"),
 )  # fmt: skip
 BUILT_IN: dict[str, Measure] = {measure.name: measure for measure in _LISTED}
+MEASURES.built_in = BUILT_IN

@@ -19,8 +19,7 @@ import numpy as np
 
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.measures.built_in import first_delivery
-from taichi_ants.measures.measure import COUNTS, RUN, Measure
-from taichi_ants.measures.registry import MEASURES, get
+from taichi_ants.measures.measure import COUNTS, MEASURES, RUN, Measure, get
 
 WINDOW = 50
 # Windows of episodes: slice, words, fewest episodes of a run.

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.errors import AntsError, checked_whole
-from taichi_ants.measures.measure import Measure
-from taichi_ants.measures.registry import get
+from taichi_ants.measures.measure import Measure, get
 from taichi_ants.records import Record
 
 

@@ -23,7 +23,7 @@ from taichi_ants.measures import finished
 from taichi_ants.rules.rule import RULES
 from taichi_ants.settings import DeclaredSetting, Named, Settings, all_of, declared, flat
 from taichi_ants.studies.folder import asked_in
-from taichi_ants.studies.sweep_file import declaration_of
+from taichi_ants.studies.sweep_file import KINDS, declaration_of
 from taichi_ants.task import Task, observations
 
 Row = tuple[str, ...]
@@ -34,20 +34,10 @@ _OF_POINTS = {  # settings of points: unit and meaning
     "world.seed": ("", "seed from which the world is drawn"),
     "world.per_seed": ("", "whether each seed has a world of its own"),
     "world_kinds": ("", "kinds of world of the study of colonies"),
-    "episodes": ("episodes", "training, before the evaluation"),
-    "rollouts": ("episodes", "evaluation"),
-    "ticks": ("ticks", "length of an episode"),
-    "max_steps": ("ticks", "largest length of an episode, which ends at a delivery"),
-    "ants": ("ants", "number at the start"),
-    "capacity": ("ants", "largest number of living ants"),
-    "start": ("", "start cells of ants that the world does not list"),
-    "sharing": ("", "whether ants learn into one table or into their own"),
-    "evaluation_epsilon": ("", "exploration rate of the evaluation"),
     "policy.name": ("", "policy that ants follow"),
     "policy.sha256": ("", "checksum of its action values"),
-    "measure_every": ("ticks", "time between two rows of series of measures"),
-    "during": ("", "episodes in which the events happen"),
 }
+_OF_POINTS |= {s.name: (s.rule.unit, s.rule.help) for of in KINDS.values() for s in declared(of)}
 # Groups of settings that have no effect on a lone ant, whose episode ends at its delivery.
 _OF_COLONIES = ("task.traffic", "task.life", "task.labour", "task.reward", "task.turns_at_queen")
 _OF_LEARNING = re.compile(

@@ -5,8 +5,7 @@ See `docs/rules.md`, and `register` for the form of a rule.
 
 from taichi_ants.rules.functions import exp, log, pick, power
 from taichi_ants.rules.inputs import KINDS
-from taichi_ants.rules.registry import get, names, register
-from taichi_ants.rules.rule import Parameters, Rule
+from taichi_ants.rules.rule import Parameters, Rule, get, names, register
 
 __all__ = ["KINDS", "Parameters", "Rule", "exp", "get", "log", "names", "pick", "power", "register"]
 __dir__ = __all__.copy  # completion lists only public names

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from taichi_ants.features import INPUTS
 from taichi_ants.features.feature import Input
+from taichi_ants.grid.constants import MOST_REWARD
 
 if TYPE_CHECKING:
     import numpy as np
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
 AHEAD = 3  # entries of an input with a value for each cell ahead: left, forward, right
 LEVELS, LEVEL = "levels_", "level_"  # the beginnings of inputs that read a field
 MOST_LEVEL = 1_000_000_000
-MOST_REWARD = 1000
 
 
 class RuleKind(NamedTuple):
@@ -28,12 +28,18 @@ class RuleKind(NamedTuple):
     of_fields: tuple[str, ...] = ()  # the beginnings of inputs that read a field
 
 
-_CODES = "codes seen: 0 E, 1 O, 2 T or S, 3 F or Q; see the glossary"
 _CUE = "the ant's cue: the pheromone that an ant with its load follows"
+_TICK = Input("number of the tick in the episode, from 0")
 _OF_ANTS = {  # of all kinds of rules that ants follow
     "trait": Input("number of the ant from 0 to less than 1, which never changes"),
     **{name: read for name, (read, _) in INPUTS.items()},  # of features
-    "tick": Input("number of the tick in the episode, from 0"),
+    "tick": _TICK,
+}
+_OF_ACTIONS = {  # of rules that are called after an action
+    "carries": Input("1 if the ant has food after its action, else 0"),
+    "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
+    "paper_state": Input("the paper's state of the ant before its action, 0 to 127"),
+    **_OF_ANTS,
 }
 KINDS: dict[str, RuleKind] = {
     "choice": RuleKind(
@@ -41,7 +47,7 @@ KINDS: dict[str, RuleKind] = {
         *(0, 4, True),
         {
             "values": Input("action values of the ant's state; the ants then need a table", 5),
-            "codes": Input(_CODES, AHEAD),
+            "codes": Input("codes seen: 0 E, 1 O, 2 T or S, 3 F or Q; see the glossary", AHEAD),
             "levels": Input(f"levels of {_CUE}; 0 on obstacles, food and misread cells", AHEAD),
             "nearer": Input("1 if the cell is seen as S by the compass, else 0", AHEAD),
             "is_open": Input("1 if the ant can try to enter the cell, else 0", AHEAD),
@@ -61,33 +67,24 @@ KINDS: dict[str, RuleKind] = {
         {
             "level": Input("level of the cell before the deposit"),
             "carried": Input("ticks since the ant's load changed"),
-            "carries": Input("1 if the ant has food after its action, else 0"),
-            "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
-            "paper_state": Input("the paper's state of the ant before its action, 0 to 127"),
-            **_OF_ANTS,
+            **_OF_ACTIONS,
         },
         of_fields=(LEVEL,),
     ),
     "evaporation": RuleKind(
         "the level of a cell after the tick, before diffusion",
         *(0, MOST_LEVEL, False),
-        {
-            "level": Input("level of the cell before evaporation"),
-            "tick": Input("number of the tick in the episode, from 0"),
-        },
+        {"level": Input("level of the cell before evaporation"), "tick": _TICK},
     ),
     "reward": RuleKind(
         "the reward of the ant's action",
         *(-MOST_REWARD, MOST_REWARD, True),
         {
             "reward": Input("reward by `task.rewards` and `task.foods`"),
-            "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
-            "carries": Input("1 if the ant has food after its action, else 0"),
-            "paper_state": Input("the paper's state of the ant before its action, 0 to 127"),
             "next_paper_state": Input("the paper's state after the tick, 0 to 127"),
             "levels": Input(f"levels of {_CUE}, after the tick; 0 on obstacles and food", AHEAD),
             "level": Input("level of the ant's cue on its own cell, after the tick"),
-            **_OF_ANTS,
+            **_OF_ACTIONS,
         },
         of_fields=(LEVELS, LEVEL),
     ),
@@ -122,29 +119,17 @@ class Vector(tuple):
         return super().__getitem__(int(k))
 
 
-def drawn(inputs: Mapping[str, Input], n: int) -> Iterator[dict[str, Any]]:
-    """Yield n drawn sets of inputs by name: floats, and Vectors of floats."""
+def values_shown(values: Mapping[str, Any]) -> str:
+    """Return the values of the arguments of a rule for a message."""
+    return ", ".join(f"{name}={value}" for name, value in values.items())
+
+
+def drawn(rng: np.random.Generator, name: str, length: int = 0) -> Any:
+    """Return a value that an input of this name can have: a float, or a Vector of floats."""
     import numpy as np
 
-    rng = np.random.default_rng(0)
-    for _ in range(n):
-        yield {
-            name: Vector(_drawn(rng, name) for _ in range(read.length))
-            if read.length
-            else _drawn(rng, name)
-            for name, read in inputs.items()
-        }
-
-
-def values_shown(*values: Mapping[str, Any]) -> str:
-    """Return the values of inputs and parameters for a message."""
-    return ", ".join(f"{name}={value}" for numbers in values for name, value in numbers.items())
-
-
-def _drawn(rng: np.random.Generator, name: str) -> float:
-    """Return a value that an input of this name, or an entry of it, can have."""
-    import numpy as np
-
+    if length:
+        return Vector(drawn(rng, name) for _ in range(length))
     if name in _MOST:
         return float(rng.integers(_MOST[name] + 1))
     if name in ("random", "random_2", "epsilon", "trait"):

@@ -1,16 +1,21 @@
-"""Rules that you write, their parameters, and their trial on drawn inputs."""
+"""Rules that you write: their parameters, their registration, and their trial on drawn inputs."""
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, make_dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
-from taichi_ants.errors import shown, unusable
+from taichi_ants.errors import AntsError, check_one_of, shown, unusable
 from taichi_ants.registry import Registry
-from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, values_shown
-from taichi_ants.settings import Settings, declared
+from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, input_of, values_shown
+from taichi_ants.rules.language import LanguageError, kernel_source
+from taichi_ants.settings import Setting, Settings, declared
+
+if TYPE_CHECKING:
+    import numpy as np
 
 TRIES = 2000  # drawn sets of inputs with which `register` tries a rule
 BUILT_IN = {
@@ -87,38 +92,136 @@ RULES: Registry[Rule] = Registry(
 )
 
 
+get = RULES.get
+
+
 def _parameters(name: str, values: Mapping[str, Any]) -> Parameters:
     return RULES.get(name).settings(**values)
 
 
-def tries(rule: Rule, n: int = TRIES) -> Iterator[tuple[dict[str, Any], dict[str, float]]]:
-    """Yield n drawn sets of inputs, and of parameters within their ranges, each by name."""
+def register(
+    kind: str, *, name: str | None = None
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return a decorator that registers a function as a rule and returns the function.
+
+    It replaces your own rule of the same name and kind. Existing colonies do not change.
+
+    Args:
+        kind: "choice", "deposit", "evaporation" or "reward".
+        name: The name of the rule, by default that of the function.
+
+    Raises:
+        AntsError: A name is taken or not known, the function contains something that kernels cannot
+            compute, or a result for drawn inputs is outside the range of the kind.
+    """
+    check_one_of("the kind of the rule", kind, tuple(KINDS))
+
+    def add(function: Callable[..., Any]) -> Callable[..., Any]:
+        if not inspect.isfunction(function) or function.__name__ == "<lambda>":
+            raise AntsError(
+                f"the rule is {shown(function)}; it must be a function defined with def."
+            )
+        called = function.__name__ if name is None else name
+        RULES.check_new(called)
+        if called in RULES.yours and RULES.yours[called].kind != kind:
+            raise AntsError(
+                f"{called!r} is the name of a rule of the kind {RULES.yours[called].kind!r}; "
+                "choose another name."
+            )
+        inputs, settings = _arguments(called, kind, function)
+        arguments = inspect.signature(function).parameters
+        lengths = {name: inputs[name].length if name in inputs else 0 for name in arguments}
+        rule = Rule(called, kind, function, inputs, settings, "")
+        try:
+            rule = replace(rule, source=kernel_source(function, lengths))
+        except LanguageError as error:
+            raise unusable(rule, error) from None
+        _try_in_python(rule)
+        RULES.add(called, rule)
+        return function
+
+    return add
+
+
+def _arguments(
+    name: str, kind: str, function: Callable[..., Any]
+) -> tuple[dict[str, Input], type[Parameters]]:
+    """Return the inputs of a function, and the class of its parameters, which have defaults."""
+    inputs, parameters = {}, []
+    hints = get_type_hints(function, include_extras=True)
+    for argument in inspect.signature(function).parameters.values():
+        hint = hints.get(argument.name, type(argument.default))
+        hint = hint if get_origin(hint) is Annotated else Annotated[hint, Setting("parameter")]
+        has_default = argument.default is not argument.empty
+        is_plain = argument.kind is argument.POSITIONAL_OR_KEYWORD
+        if is_plain and not has_default and (read := input_of(kind, argument.name)):
+            inputs[argument.name] = read
+        elif is_plain and has_default and get_args(hint)[0] in (int, float):
+            parameters.append((argument.name, hint, field(default=argument.default)))
+        else:
+            more = "".join(f", {start}FIELD" for start in KINDS[kind].of_fields)
+            raise AntsError(
+                f"the rule {name!r} has the argument `{argument}`, which is not an input of the "
+                f"kind {kind!r}; choose from {', '.join(KINDS[kind].inputs)}{more}, or make it a "
+                "parameter by a default of type int or float."
+            )
+    settings: Any = make_dataclass(name, parameters, bases=(Parameters,), frozen=True)
+    settings.path = f"task.rules.{name}"
+    settings.__doc__ = f"The parameters of the rule {name!r}."
+    settings()  # checks the defaults
+    return inputs, settings
+
+
+def drawn_parameters(rule: Rule, rng: np.random.Generator) -> dict[str, Any]:
+    """Return drawn values, within their ranges, of half of the parameters that have a range."""
+    values: dict[str, Any] = {}
+    for setting in declared(rule.settings):
+        least, most = setting.rule.least, setting.rule.most
+        if least is not None and most is not None and rng.random() < 0.5:
+            value = float(rng.choice([least, most, rng.uniform(least, most)]))
+            values[setting.name] = round(value) if setting.kind is int else value
+    return values
+
+
+def tries(rule: Rule, n: int = TRIES) -> Iterator[dict[str, Any]]:
+    """Yield n drawn sets of the arguments of a rule by name: floats, and Vectors of floats."""
     import numpy as np
 
-    rng, defaults = np.random.default_rng(1), vars(rule.settings())
-    for inputs in drawn(rule.inputs, n):
-        parameters = {name: float(value) for name, value in defaults.items()}
-        for setting in declared(rule.settings):
-            least, most = setting.rule.least, setting.rule.most
-            if least is not None and most is not None and rng.random() < 0.5:
-                value = rng.choice([least, most, rng.uniform(least, most)])
-                parameters[setting.name] = float(round(value) if setting.kind is int else value)
-        yield inputs, parameters
+    rng, defaults = np.random.default_rng(0), vars(rule.settings())
+    for _ in range(n):
+        parameters = defaults | drawn_parameters(rule, rng)
+        inputs = {name: drawn(rng, name, read.length) for name, read in rule.inputs.items()}
+        yield inputs | {name: float(value) for name, value in parameters.items()}
 
 
-def try_in_python(rule: Rule) -> None:
+def _try_in_python(rule: Rule) -> None:
     """Compute a rule in Python for many inputs; AntsError if it fails or leaves its range."""
     kind = KINDS[rule.kind]
     form = f"{'a whole number' if kind.is_whole else 'a number'} from {kind.least} to {kind.most}"
-    for inputs, parameters in tries(rule):
+    for values in tries(rule):
         try:
-            result = rule.function(**inputs, **parameters)
-            said = f"it returns {shown(result)}"
+            result = rule.function(**values)
+            fault = f"it returns {shown(result)}"
             is_number = isinstance(result, (bool, int, float))
             if is_number and kind.least <= result <= kind.most:
-                said = said if kind.is_whole and result != math.floor(result) else ""
+                fault = fault if kind.is_whole and result != math.floor(result) else ""
         except Exception as error:
-            said = f"{type(error).__name__}: {error}"
-        if said:
+            fault = f"{type(error).__name__}: {error}"
+        if fault:
             must = f"it must return {kind.result.split(':')[0]}, {form}"
-            raise unusable(rule, f"{said} for {values_shown(inputs, parameters)}, but {must}")
+            raise unusable(rule, f"{fault} for {values_shown(values)}, but {must}")
+
+
+def registered(kind: str, name: str) -> Rule | None:
+    """Return your rule of this name; None for the built-in rules of a kind."""
+    return None if name in BUILT_IN[kind] else get(name)
+
+
+def names(kind: str | None = None) -> tuple[str, ...]:
+    """Return the names of your rules, of one kind or of all, in the order of registration."""
+    return tuple(name for name, rule in RULES.yours.items() if kind in (None, rule.kind))
+
+
+def words(kind: str) -> tuple[str, ...]:
+    """Return all words that name a rule of a kind: the built-in ones, then yours."""
+    return (*BUILT_IN[kind], *names(kind))

@@ -94,6 +94,7 @@ def varying(axes: Mapping[str, Axis]) -> dict[str, Axis]:
 class Design(Settings):
     """The design of a sweep: keys of its file.
 
+    `margin` is the largest difference in the first measure that is too small to matter.
     With `sensitivity`, points follow the scheme of Saltelli without second order: `samples` groups
     of a point for each setting that varies and two more.
     """
@@ -102,6 +103,7 @@ class Design(Settings):
     samples: Annotated[int | None, Setting(least=1, most=100_000, only=_DRAWN)] = None
     design_seed: Annotated[int, Setting(least=0, most=2**63 - 1, only=_DRAWN)] = 0
     sensitivity: Annotated[Flag, Setting(only=_DRAWN)] = False
+    margin: Annotated[float, Setting(least=0, only=("design", "grid"))] = 0.0
 
     @property
     def is_grid(self) -> bool:
@@ -115,10 +117,10 @@ class Design(Settings):
             yield f"sensitivity = true with samples = {self.samples} needs a power of 2, as 64."
 
     def facts(self) -> dict[str, Any]:
-        """Return what determines the points besides the settings; empty for a grid."""
+        """Return what determines points and findings besides the settings that vary."""
         more = {"sensitivity": True} if self.sensitivity else {}
         own = {"design": self.design, "design_seed": self.design_seed, **more}
-        return {} if self.is_grid else {"design": own}
+        return {"margin": self.margin, **({} if self.is_grid else {"design": own})}
 
     def rows(self, axes: Mapping[str, Axis]) -> list[dict[str, Any]]:
         """Return the points: a value of each axis by name; AntsError if axes do not suit."""

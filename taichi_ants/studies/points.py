@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import Recorder
 from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
-from taichi_ants.settings import flat
+from taichi_ants.settings import Setting, flat
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, ROW
 from taichi_ants.worlds.world import World
@@ -47,6 +47,8 @@ SERIES = "series_"  # begins the names of the series of measures in outcomes
 # Settings that only the points that use them name, so that the blocks of others stay valid.
 _LATER = ("policy", "measures", "measure_every", "evaluation_epsilon", "protocol")
 
+_TRAINING = Setting("training, before the evaluation", unit="episodes")
+_EVALUATION = Setting("evaluation", unit="episodes")
 Progress = Callable[[float], None]
 Where = Mapping[str, Any]  # the arguments `threads` and `arch` of `train`
 Seeds = Sequence[int]
@@ -86,18 +88,15 @@ class RunPoint:
     rollouts). With training also `q_values`, float32 (seeds, n_states, 5). Raises AntsError if a
     value is not allowed.
 
-    Attributes:
-        episodes: The number of training episodes; 0 with a policy.
-        max_steps: The step limit of episodes and rollouts.
-        policy: The policy that the ant follows if there is no training.
+    With a `policy`, which the ant then follows, there are no episodes of training.
     """
 
     world: World
     task: Task
     training: TrainingConfig
-    episodes: int = EPISODES
-    max_steps: int = EPISODE_STEPS
-    rollouts: int = 50
+    episodes: Annotated[int, _TRAINING] = EPISODES
+    max_steps: Annotated[int, Setting("longest time to a delivery", unit="ticks")] = EPISODE_STEPS
+    rollouts: Annotated[int, _EVALUATION] = 50
     policy: FixedPolicy | None = None
     kind: ClassVar[str] = "runs"
     ants: ClassVar[int] = 1
@@ -191,40 +190,35 @@ class ColonyPoint:
         world: The world, or the recipe of one for each seed, all of the same ranges.
         pool: Worlds of the same ranges for training; each seed draws one for each episode. None
             means training in `world`.
-        sharing: "shared" or "independent" tables during training.
-        start, capacity: The arguments of `Colony`.
-        episodes: The number of training episodes; with 0, ants follow `policy`, the table of
-            `after`, or a rule that needs no table.
-        ticks: The length of each episode of training and evaluation.
+        sharing, start, capacity: The arguments of `Colony` during training.
+        episodes: If 0, ants follow `policy`, the table of `after`, or a rule that needs no table.
         after: The point from whose shared table learning starts; None means the initial values.
         policy: The policy that ants follow if there is no training. A task whose ants choose
             without action values has neither.
-        evaluation_epsilon: The exploration rate of the evaluation. None: the lowest one of the
-            training, or 0 with `policy`.
+        evaluation_epsilon: If None, the lowest rate of the training, or 0 with `policy`.
         measures, measure_every: The arguments `measures` and `every` of `Colony.run` for the
             evaluation, without `Measure` objects.
-        protocol: Events with interventions, see `taichi_ants.protocol`.
-        during: When they happen: in each episode of the "evaluation", the "training", or "both".
+        protocol: Events, see `taichi_ants.protocol`, of each episode of what is in `during`.
     """
 
     world: World | Drawn
     task: Task
     training: TrainingConfig
     pool: tuple[World, ...] | None = None
-    ants: int = 1
-    sharing: str = "shared"
-    start: str = "nest"
-    capacity: int | None = None
-    episodes: int = 50
-    ticks: int = 1000
-    rollouts: int = 4
+    ants: Annotated[int, Setting("number at the start", unit="ants")] = 1
+    sharing: Annotated[str, Setting("whether ants learn into one table or their own")] = "shared"
+    start: Annotated[str, Setting("start cells of ants that the world does not list")] = "nest"
+    capacity: Annotated[int | None, Setting("largest number of living ants", unit="ants")] = None
+    episodes: Annotated[int, _TRAINING] = 50
+    ticks: Annotated[int, Setting("length of an episode", unit="ticks")] = 1000
+    rollouts: Annotated[int, _EVALUATION] = 4
     after: ColonyPoint | None = None
     policy: FixedPolicy | None = None
-    evaluation_epsilon: float | None = None
+    evaluation_epsilon: Annotated[float | None, Setting("exploration rate in evaluation")] = None
     measures: tuple[str, ...] = ()
-    measure_every: int | None = None
+    measure_every: Annotated[int | None, Setting("time between measures", unit="ticks")] = None
     protocol: tuple[ProtocolEvent, ...] = ()
-    during: str = "evaluation"
+    during: Annotated[str, Setting("episodes in which the events happen")] = "evaluation"
     kind: ClassVar[str] = "colony"
 
     def __post_init__(self) -> None:

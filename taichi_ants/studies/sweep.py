@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -44,7 +43,6 @@ class Sweep:
         settings: The settings that vary, by row.
         grids: For each [vary] table, its rows, and the values or ranges of its settings.
         against: The setting and its value with which all others are compared.
-        margin: The largest difference in the first measure that is too small to matter.
     """
 
     base: Base
@@ -54,13 +52,12 @@ class Sweep:
     grids: Sequence[tuple[slice, Mapping[str, Axis]]]
     design: Design
     against: tuple[str, Any] | None
-    margin: float
 
     def facts(self) -> dict[str, Any]:
         """Return what determines the results besides the settings of the points."""
-        own = {"measures": self.base.measures, "against": self.against, "margin": self.margin}
-        every = {k: v for k, v in self.base.reading.items() if k == "measure_every"}
-        return {**own, **every, **self.design.facts(), "vary": self.settings}
+        own = {k: v for k, v in self.base.reading.items() if k == "measure_every"}
+        own |= {"measures": self.base.measures, "against": self.against}
+        return {**own, **self.design.facts(), "vary": self.settings}
 
     def findings(self, values: np.ndarray) -> dict[int, dict[str, Any]]:
         """Return by row the finding on its difference from the row with the value `against`.
@@ -79,7 +76,7 @@ class Sweep:
                 if row.get(name) != value and {**row, name: value} in rows
             }
             differences = [of_grid[n] - of_grid[other] for n, other in pairs.items()]
-            judged = judge([Contrast("", each, above(self.margin)) for each in differences])
+            judged = judge([Contrast("", each, above(self.design.margin)) for each in differences])
             for n, difference, contrast in zip(pairs, differences, judged, strict=True):
                 word = _WORDS.get(contrast.verdict.value, "undecided")
                 low, high = contrast.low, contrast.high
@@ -122,9 +119,6 @@ def sweep_of(file: Settings) -> Sweep:
     points = tuple(base.point(row, built) for row in rows)
     for of_table, names in [(slice(None), base.fixed), *grids]:
         check_training(names, points[of_table])
-    margin = file.get("margin", 0)
-    if type(margin) not in (int, float) or not 0 <= margin < math.inf:
-        raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
     against: Any = flat(file["against"]) if isinstance(file.get("against"), dict) else {}
     (against,) = against.items() if len(against) == 1 else [None]
     of_grid = drawn.is_grid and any(against in row.items() for row in rows)
@@ -139,7 +133,7 @@ def sweep_of(file: Settings) -> Sweep:
     study = Study(points, base.seeds, arrays, partial(_measured, base.kind, base.measures))
     place = {point: n for n, point in enumerate(study.points)}
     order = [place[point] for point in points]
-    return Sweep(base, study, order, rows, grids, drawn, against, margin)
+    return Sweep(base, study, order, rows, grids, drawn, against)
 
 
 def _measured(
@@ -211,7 +205,7 @@ def tables(sweep: Sweep, results: Results) -> str:
         report = f"{report}\n{design.report(indices, seeds)}"
         files.write_csv(folder / "sensitivity.csv", indices, COLUMNS)
     if results.figures:
-        _draw(sweep, first, values[first], files.check_writable_folder(folder / "figures"))
+        _draw(sweep, first, values[first], folder / "figures")
     return report
 
 

@@ -28,7 +28,7 @@ from taichi_ants.task import Task
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = (  # keys that are not settings of points
-    *("kind", "seeds", "measures", "measure_every", "margin", "against", "vary"),
+    *("kind", "seeds", "measures", "measure_every", "against", "vary"),
     *(key.name for key in declared(Design)),
 )
 # Attributes of points that are not settings.
@@ -38,6 +38,10 @@ _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_eve
 _BESIDE = {"reward": "deliveries", "greedy_return": "greedy_deliveries"}
 _BESIDE |= {f"return_{of}": f"deliveries_{of}" for of in ("first50", "second50", "last50", "all")}
 
+# The beginnings of names of settings that need a table in the file; those of rules need none.
+_GROUPS = [*(group.path for group in named_groups(Task)), *protocol.EVENTS]
+_ENTRY = re.compile(rf"({'|'.join(name for name in _GROUPS if name != 'task.rules')})\.[^.]+")
+
 Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
 
 
@@ -45,7 +49,7 @@ class Base(NamedTuple):
     """The part of a file that does not depend on how its points are chosen.
 
     Attributes:
-        tables: The file, with tables of events by their numbers: at.1
+        names: The full names of settings and of empty tables; events are numbered: at.1
         fixed: The fixed settings by their full names.
         reading: The arguments of points that are not settings.
     """
@@ -53,7 +57,7 @@ class Base(NamedTuple):
     kind: str
     measures: tuple[str, ...]
     seeds: tuple[int, ...]
-    tables: Settings
+    names: tuple[str, ...]
     fixed: Settings
     reading: dict[str, Any]
 
@@ -78,8 +82,9 @@ class Base(NamedTuple):
         seeds = file.get("seeds", 10)
         if not isinstance(seeds, list):
             seeds = range(checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds"))
+        names = tuple(name for name, _ in settings_in(tables))
         reading = _reading(kind, wanted, file.get("measure_every"))
-        return cls(kind, tuple(wanted), arguments.checked_seeds(seeds), tables, fixed, reading)
+        return cls(kind, tuple(wanted), arguments.checked_seeds(seeds), names, fixed, reading)
 
     def axes(self, table: Any) -> dict[str, Axis]:
         """Return the values or ranges of the settings in a [vary] table, by their full names.
@@ -99,10 +104,12 @@ class Base(NamedTuple):
                     raise AntsError(
                         f"{name} is in [vary], and {other} in the fixed settings; remove one."
                     )
-            self._check_has_table(name)
+            entry = _ENTRY.match(name)
+            if entry and not any(f"{other}.".startswith(f"{entry[0]}.") for other in self.names):
+                raise AntsError(f"{name} is in [vary], but the file has no {entry[0]}; add it.")
             if isinstance(values, dict):
                 declaration = declaration_of(name, self.fixed)
-                of_points = (f.name for f in fields(KINDS[self.kind]) if "int" in str(f.type))
+                of_points = (s.name for s in declared(KINDS[self.kind]) if s.kind is int)
                 is_whole = name in ("world.seed", *of_points)
                 whole = declaration.kind is int if declaration else is_whole
                 axes[name] = Range.of(name, values, whole)
@@ -113,18 +120,6 @@ class Base(NamedTuple):
                     raise AntsError(f"{name} has {shown(value)} more than once; remove one.")
         return axes
 
-    def _check_has_table(self, name: str) -> None:
-        """Raise AntsError if a setting is of a name without a table; rules need none."""
-        groups = "|".join([*(group.path for group in named_groups(Task)), *protocol.EVENTS])
-        entry = re.match(rf"({groups})\.([^.]+)", name)
-        if entry is None or entry[2] in rules.names():
-            return
-        table: Any = self.tables
-        for key in entry[0].split("."):
-            table = table.get(key) if isinstance(table, dict) else None
-        if table is None:
-            raise AntsError(f"{name} is in [vary], but the file has no table {entry[0]}; add it.")
-
     def point(self, row: Settings, built: dict[str, Any]) -> Point:
         """Return the point of the fixed settings and a row of others.
 
@@ -132,8 +127,7 @@ class Base(NamedTuple):
         not allowed, or there are too few episodes for a measure.
         """
         tree = nested(self.fixed | row)
-        named = [name for name in protocol.EVENTS if isinstance(tree.get(name), Mapping)]
-        events = {name: tree.pop(name) for name in named}
+        events = {n: tree.pop(n) for n in protocol.EVENTS if isinstance(tree.get(n), Mapping)}
         world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
         for part, table in zip(_PARTS, (world, task, training), strict=False):
             expect(part, table, Mapping)

@@ -8,27 +8,22 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from taichi_ants.features.castes import Attraction, Exponent, Temperature
-from taichi_ants.rules.registry import registered, words
-from taichi_ants.rules.rule import Rule
+from taichi_ants.rules.rule import Rule, registered, words
 from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
     import numpy as np
 
+_CELLS = Setting(only=("rule", "deneubourg"))
+
 
 @dataclass(frozen=True)
 class Choice(Settings, path="task.choice"):
-    """The rule by which ants choose actions.
+    """The rule by which ants choose actions; `sentences` describe the built-in ones.
 
-    - "greedy" takes an action with the largest value, and breaks ties at random.
-    - "softmax" takes action a with a probability proportional to exp(Q(s, a) / temperature).
-    - "deneubourg" needs no action values. The ant gives at the queen, picks up food in view, and
-      otherwise enters an open cell ahead with a probability proportional to (k + level)^exponent,
-      after Deneubourg et al. (1990). See `docs/colony.md`. Only colonies support it. Levels are
-      those of the outbound cue; for ants with food, of `carriers_follow` or a homing pheromone.
-    - Other names are those of your rules, see `taichi_ants.rules`. Only colonies support them.
-
-    With "greedy" and "softmax", ants also explore: with probability epsilon, any action is taken.
+    Only colonies support "deneubourg", which needs no action values, and the names of your rules,
+    see `taichi_ants.rules`. "deneubourg" compares levels of the outbound cue; for ants with food,
+    those of `carriers_follow` or a homing pheromone. See `docs/colony.md`.
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -56,19 +51,14 @@ class Choice(Settings, path="task.choice"):
     k: Annotated[
         Attraction,
         Setting("attraction of a cell without a trail", unit="units of trail level"),
-        Setting(usual=20.0, only=("rule", "deneubourg")),
+        Setting(usual=20.0),
+        _CELLS,
     ] = None
     exponent: Annotated[
-        Exponent,
-        Setting("exponent of the attraction of a cell; larger values follow stronger trails more"),
-        Setting(usual=2.0, only=("rule", "deneubourg")),
+        Exponent, Setting("exponent of the attraction of a cell", usual=2.0), _CELLS
     ] = None
     carriers_follow: Annotated[
-        str | None,
-        Setting(
-            "pheromone whose levels ants with food and a compass compare; none: the outbound cue"
-        ),
-        Setting(only=("rule", "deneubourg")),
+        str | None, Setting("pheromone that ants with food and a compass follow"), _CELLS
     ] = None
 
     @classmethod

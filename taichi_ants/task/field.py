@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from enum import IntFlag
 from typing import Annotated, ClassVar, Literal
 
+from taichi_ants.grid.constants import TRAIL as TRAIL
 from taichi_ants.settings import Setting
 from taichi_ants.task.pheromone import Pheromone
 
 Laid = Literal["with_food", "without_food", "always", "dead_end", "failed_pick_up", "never"]
-TRAIL, COMPASS = "trail", "compass"  # the names of the cues that are not fields
+COMPASS = "compass"  # the name of the cue that is not a pheromone
 
 
 class Occasion(IntFlag):
@@ -40,19 +41,9 @@ OCCASIONS: dict[str, Occasion] = {
 class Field(Pheromone, path="task.fields.NAME"):
     """The rules of a further pheromone, which has a level in each cell, 0 at the start.
 
-    All settings of `Pheromone` apply, and `deposited_when` says when ants deposit. `view` has an
-    effect only if the field is a cue. By `deposited_when`:
-
-    - "with_food": like the trail, on each cell that an ant enters with food and, when it picks up
-      food, on the cell of the food and on its own cell.
-    - "without_food": on each cell that an ant enters without food, and on its own cell when it
-      delivers.
-    - "always": on all these cells.
-    - "dead_end": on the cell of an ant without food that sees three obstacles, before it acts.
-    - "failed_pick_up": on the cell of an ant without food that fails to pick up food.
-
-    Deposits that fade count ticks since the ant's last pick-up, delivery or birth, or since the
-    start of the episode.
+    All settings of `Pheromone` apply, and `sentences` describe when ants deposit. `view` has an
+    effect only if the field is a cue. Deposits that fade count ticks since the ant's last pick-up,
+    delivery or birth, or since the start of the episode.
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -69,10 +60,7 @@ class Field(Pheromone, path="task.fields.NAME"):
         **Pheromone.sentences,
     }
 
-    deposited_when: Annotated[
-        Laid,
-        Setting("occasions on which ants deposit; a cue that is never laid gives no direction"),
-    ] = "with_food"
+    deposited_when: Annotated[Laid, Setting("occasions on which ants deposit")] = "with_food"
 
     @property
     def counts_without_food(self) -> bool:

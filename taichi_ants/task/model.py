@@ -105,9 +105,8 @@ class Model:
         self.field_names = (TRAIL, *task.fields) if self.rules else ()
         # Whether pheromones are laid one after the other, because rules of deposits read others.
         self.lays_in_turn = any(rule.kind == "deposit" and rule.fields for rule in self.rules)
-        inputs = {name for rule in self.rules for name in rule.inputs}
-        # Whether a rule reads what changes with the deliveries of a tick before ants observe.
-        self.reads_deliveries = any(inputs & feature.by_deliveries for feature in self.features)
+        inputs = [read for rule in self.rules for read in rule.inputs.values()]
+        self.reads_deliveries = any(read.by_deliveries for read in inputs)
 
     def _cues(self, outbound: int, homing: int, carriers_follow: int) -> Cues:
         half = self.views[outbound] == "half"

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from taichi_ants.rules.registry import registered, words
-from taichi_ants.rules.rule import BUILT_IN, Rule
-from taichi_ants.settings import Setting, Settings
+from taichi_ants.rules.rule import BUILT_IN, Rule, registered, words
+from taichi_ants.settings import Setting, Settings, Share
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 
 if TYPE_CHECKING:
     import numpy as np
 
-Own = TypeVar("Own", bound="Pheromone")
 View = Literal["half", "strongest", "strongest_under_carriers"]
 DEPOSITS = BUILT_IN["deposit"]
 MAX_DEPOSIT = 1_000_000
@@ -27,19 +25,10 @@ Level = Annotated[
 
 @dataclass(frozen=True)
 class Pheromone(Settings, path="task.pheromone"):
-    """The rules by which trails are laid, evaporate and spread.
+    """The rules by which trails are laid, evaporate and spread; `sentences` describe the values.
 
-    - Evaporation "linear" lowers a trail by 1 per tick. "exponential" halves it every `half_life`
-      ticks, and removes it below 1.
-    - Each neighbour gets a sixth of the share `diffusion`, except that the parts for obstacles and
-      for cells outside the world stay.
-    - By `deposit`, an ant with food changes the trail of its cell. "set" sets it to `level`. "add"
-      adds `level`, up to `cap`. "fading" raises it to `level` minus `slope` for each tick for which
-      the ant has carried food; such trails rise towards food if `slope` exceeds the evaporation.
-    - Other names of `evaporation` and `deposit` are those of your rules, see `taichi_ants.rules`.
-    - By `view`, an ant without food sees trails of at least 1 on empty cells as T. "half" requires
-      at least half the level of the strongest in view, "strongest" the same level.
-      "strongest_under_carriers" also compares with trails under ants with food.
+    Other names of `evaporation` and `deposit` are those of your rules, see `taichi_ants.rules`.
+    Trails that fade rise towards food if `slope` exceeds the evaporation.
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -72,16 +61,14 @@ class Pheromone(Settings, path="task.pheromone"):
         Setting("time in which a trail halves", unit="ticks", above=0, usual=50.0),
         Setting(only=("evaporation", "exponential")),
     ] = None
-    diffusion: Annotated[
-        float,
-        Setting("share of a trail that spreads to the six neighbours per tick", least=0, most=1),
-    ] = 0.0
+    diffusion: Annotated[Share, Setting("share of a trail that spreads to neighbours per tick")] = (
+        0.0
+    )
     deposit: Annotated[
         str,
         Setting(
-            "level that an ant lays on a cell: the cell's level becomes level (set), grows by "
-            "level (add), or rises to level minus slope per tick since the ant's load changed "
-            "(fading)",
+            "level of a cell with a new deposit: level (set), level more (add), or at least level "
+            "minus slope per tick since the ant's load changed (fading)",
             choices=partial(words, "deposit"),
         ),
     ] = "set"
@@ -95,15 +82,13 @@ class Pheromone(Settings, path="task.pheromone"):
     ] = None
     slope: Annotated[
         Level,
-        Setting("decrease of an ant's deposits per tick since its load changed", usual=10),
-        Setting(only=("deposit", "fading")),
+        Setting("decrease per tick since the load changed", usual=10, only=("deposit", "fading")),
     ] = None
     view: Annotated[
         View,
         Setting(
-            "lowest level that ants see as T or S: half of the highest level in view (half) or the "
-            "highest itself (strongest), also counting trails under ants with food "
-            "(strongest_under_carriers)"
+            "lowest level seen as a cue: half of the highest in view (half), or the highest "
+            "(strongest), also of those under ants with food (strongest_under_carriers)"
         ),
     ] = "half"
 
@@ -133,7 +118,7 @@ class Pheromone(Settings, path="task.pheromone"):
         return -(-int(self.level) // self.slope) if self.slope else 0
 
     @property
-    def lasting(self: Own) -> Own:
+    def lasting(self) -> Pheromone:
         """This pheromone without evaporation."""
         return self.replace(evaporation="none")
 

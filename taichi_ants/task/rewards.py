@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from taichi_ants.features.foods import Reward
 from taichi_ants.settings import Setting, Settings
-from taichi_ants.task.constants import MOST_REWARD
 from taichi_ants.task.events import Event
 
 if TYPE_CHECKING:
     import numpy as np
-
-Reward = Annotated[int, Setting(least=-MOST_REWARD, most=MOST_REWARD)]
 
 
 @dataclass(frozen=True)
@@ -25,13 +23,8 @@ class Rewards(Settings, path="task.rewards"):
     }
 
     empty: Annotated[Reward, Setting("reward for a move onto a cell seen as empty (E)")] = 0
-    failed: Annotated[
-        Reward, Setting("reward for a blocked move, failed pick-up or failed delivery")
-    ] = -1
-    shaping: Annotated[
-        Reward,
-        Setting("reward for a move onto a cell seen as T (trail) or S (nearer to the queen)"),
-    ] = 1
+    failed: Annotated[Reward, Setting("reward for a failed move, pick-up or delivery")] = -1
+    shaping: Annotated[Reward, Setting("reward for a move onto a cell seen as T or S")] = 1
     pick_up: Annotated[Reward, Setting("reward for picking up food")] = 3
     deliver: Annotated[Reward, Setting("reward for delivering food to the queen")] = 10
 

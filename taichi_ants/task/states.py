@@ -9,7 +9,6 @@ an ant with food. The name of a state is the ant's load and the three letters, f
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 from taichi_ants.errors import checked_whole
 from taichi_ants.task.constants import N_STATES, SEES_CUE, SEES_GOAL
@@ -19,24 +18,10 @@ TASK_NAMES: tuple[str, str] = ("foraging", "carrying")
 CELL_LETTERS: tuple[str, str] = ("EOTF", "EOSQ")
 
 
-class State(NamedTuple):
-    """The paper's state of an ant: whether it carries food, and the codes of the cells in view."""
-
-    carries: bool
-    left: int
-    forward: int
-    right: int
-
-    @property
-    def view(self) -> tuple[int, int, int]:
-        """The three codes in the order of moves: left, forward, right."""
-        return self.left, self.forward, self.right
-
-
-def state_from_index(index: int) -> State:
-    """Return the state of index 64 * carries + 16 * left + 4 * forward + right, 0 to 127."""
+def state_from_index(index: int) -> tuple[bool, int, int, int]:
+    """Return whether the ant carries food, and the codes left, forward and right, for 0 to 127."""
     index = checked_whole("the state index", index, 0, N_STATES - 1)
-    return State(bool(index >> 6), (index >> 4) & 3, (index >> 2) & 3, index & 3)
+    return bool(index >> 6), (index >> 4) & 3, (index >> 2) & 3, index & 3
 
 
 def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int], str]:
@@ -57,16 +42,16 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
 state_name = name_of_codes(3, *CELL_LETTERS)
 
 
-def _can_occur(state: State) -> bool:  # see section 1.5 of the paper
-    queens, nearer = state.view.count(SEES_GOAL), state.view.count(SEES_CUE)
-    if not state.carries:
+def _can_occur(carries: bool, *view: int) -> bool:  # see section 1.5 of the paper
+    queens, nearer = view.count(SEES_GOAL), view.count(SEES_CUE)
+    if not carries:
         return True
     if queens:  # there is only one, and no cell is nearer to her than her neighbours
         return queens == 1 and nearer == 0
-    return not state.left == state.right == SEES_CUE
+    return not view[0] == view[2] == SEES_CUE
 
 
 # The 100 indices that can occur under the rules, ascending.
 REACHABLE_STATES: tuple[int, ...] = tuple(
-    index for index in range(N_STATES) if _can_occur(state_from_index(index))
+    index for index in range(N_STATES) if _can_occur(*state_from_index(index))
 )

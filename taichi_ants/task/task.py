@@ -11,17 +11,16 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from taichi_ants.errors import shown
 from taichi_ants.features import FEATURES, probabilities, used_by
-from taichi_ants.features.castes import ALL, NOTHING, Caste, shares_in
+from taichi_ants.features.castes import ALL, NOTHING, Caste, parts_in
+from taichi_ants.features.foods import Food
 from taichi_ants.features.labour import Labour
 from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
-from taichi_ants.rules.registry import registered, words
-from taichi_ants.rules.rule import Parameters, Rule
+from taichi_ants.rules.rule import Parameters, Rule, registered, words
 from taichi_ants.settings import Named, Setting, Settings, declared
 from taichi_ants.task import observations
 from taichi_ants.task.choice import Choice
 from taichi_ants.task.field import COMPASS, TRAIL, Field
-from taichi_ants.task.food import Food
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
@@ -41,12 +40,9 @@ _CUES = {"outbound_cue": (), "homing_cue": (COMPASS,)}  # with cues that are not
 class Traffic(Settings, path="task.traffic"):
     """Rules for entering a cell with an ant on it; by default, as in the paper, no ant may.
 
-    With `swap` or `follow`, every ant that tries to move claims the cell ahead of it, unless a
-    rock, food, the queen or the edge of the world is there. The ant with the smallest hash wins;
-    with `carriers_first`, carriers win over foragers. See `docs/colony.md`. With `swap`, a carrier
-    that wins a cell changes places with a forager that neither enters a cell nor tries to pick up
-    food. The pushed ant gets the reward of a move onto an empty cell. With `follow`, all ants of a
-    queue move at once; a ring of ants that claim each other's cells does not move.
+    `sentences` describe the settings. A pushed ant gets the reward of a move onto an empty cell.
+    With `follow`, all ants of a queue move at once, but a ring of ants does not move. See
+    `docs/colony.md`.
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -60,22 +56,13 @@ class Traffic(Settings, path="task.traffic"):
         "that move.",
     }
 
-    swap: Annotated[
-        bool,
-        Setting("allow carriers (ants with food) to change places with foragers (ants without)"),
-    ] = False
-    follow: Annotated[
-        bool, Setting("allow ants to enter a cell whose ant leaves in the same tick")
-    ] = False
+    swap: Annotated[bool, Setting("let ants with food change places with ants without")] = False
+    follow: Annotated[bool, Setting("let ants enter cells that ants leave in the tick")] = False
     carriers_first: Annotated[
         bool, Setting("let carriers win cells that foragers want too; requires swap or follow")
     ] = False
     reward_pushed: Annotated[
-        bool,
-        Setting(
-            "reward a pushed ant as for its own move if it is pushed onto the cell that it wanted",
-            only=("swap", True),
-        ),
+        bool, Setting("reward a push onto the cell that the ant wanted", only=("swap", True))
     ] = False
 
     def _faults(self) -> Iterator[str]:
@@ -127,13 +114,9 @@ class Task(Settings, path="task"):
         "evaporation_in_evaluation=no": "Pheromones do not evaporate in the evaluation.",
     }
 
-    observation: Annotated[str, Setting("observation of an ant", choices=observations.names)] = (
-        "paper"
-    )
+    observation: Annotated[str, Setting("what an ant sees", choices=observations.names)] = "paper"
     rewards: Annotated[Rewards, Setting("reward of each event")] = Rewards()
-    pheromone: Annotated[
-        Pheromone, Setting("rules by which trails are laid, evaporate and spread")
-    ] = Pheromone()
+    pheromone: Annotated[Pheromone, Setting("rules of the trail")] = Pheromone()
     fields: Annotated[Named[Field], Setting("further pheromones, by name")] = field(
         default_factory=Named
     )
@@ -141,24 +124,15 @@ class Task(Settings, path="task"):
         str, Setting("pheromone that ants without food see as T: trail, or the name of a field")
     ] = TRAIL
     homing_cue: Annotated[
-        str,
-        Setting(
-            "what ants with food see as S: compass (nearer cells), trail, or the name of a field"
-        ),
+        str, Setting("what ants with food see as S: compass, trail, or the name of a field")
     ] = COMPASS
     traffic: Annotated[Traffic, Setting("rules for entering a cell with an ant on it")] = Traffic()
     turns_at_queen: Annotated[bool, Setting("turn ants around after a delivery")] = False
     delivery: Annotated[
-        Delivery,
-        Setting(
-            "end of an ant's episode at a delivery: as in Gymnasium, updates bootstrap only if it "
-            "truncates"
-        ),
+        Delivery, Setting("end of an episode at a delivery; updates bootstrap if it truncates")
     ] = "terminates"
     evaporation_in_training: Annotated[bool, Setting("evaporate trails while ants learn")] = False
-    evaporation_in_evaluation: Annotated[
-        bool, Setting("evaporate trails while ants follow a fixed policy")
-    ] = True
+    evaporation_in_evaluation: Annotated[bool, Setting("evaporate trails in evaluations")] = True
     life: Annotated[Life, Setting("changes of ants and food in colonies")] = Life()
     choice: Annotated[Choice, Setting("rule by which ants choose actions")] = Choice()
     noise: Annotated[Noise, Setting("failures of actions and observations")] = Noise()
@@ -172,9 +146,7 @@ class Task(Settings, path="task"):
     labour: Annotated[Labour, Setting("rule by which ants start and stop foraging")] = Labour()
     reward: Annotated[
         str,
-        Setting(
-            "rule of rewards: by_event (task.rewards), or the name of your rule; colonies only"
-        ),
+        Setting("rule of rewards: by_event (task.rewards), or yours; colonies only"),
         Setting(choices=partial(words, "reward")),
     ] = "by_event"
     rules: Annotated[
@@ -189,7 +161,7 @@ class Task(Settings, path="task"):
         object.__setattr__(self, "rules", Named({**used, **others}))
 
     def _faults(self) -> Iterator[str]:
-        choice, life = self.choice, self.life
+        choice = self.choice
         without_states = choice.rule == "deneubourg" or (choice.own_rule and self.noise.misread)
         if without_states and self.observation != "paper":
             yield (
@@ -216,21 +188,11 @@ class Task(Settings, path="task"):
                     f"{what} is {shown(field_name)}; it must be one of {', '.join(known)}, or the "
                     "name of a field that you add to `task.fields`."
                 )
-        if self.foods and life.regrowth is not None:
-            yield (
-                f"`task.life.regrowth` is {life.regrowth}; with `task.foods`, set the regrowth of "
-                "each kind instead."
-            )
-        if life.pile_move_interval and (len(self.foods) > 1 or self.has_loads):
-            yield (
-                f"`task.life.pile_move_interval` is {life.pile_move_interval}; only food of one "
-                "kind with one load in a cell can wander, so leave it out."
-            )
         for feature in FEATURES:
             yield from feature.faults(self)
         nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
         for nest in (nests or {0}) if self.castes else ():
-            shares_in(self.castes, nest)  # raises AntsError
+            parts_in(self.castes, nest)  # raises AntsError
         unused = [] if choice.needs_table else [*_OF_TABLES]
         unused += [name for name, rules in _OF_CHOICE.items() if choice.rule not in rules]
         for name, caste in self.castes.items():
@@ -311,7 +273,7 @@ class Task(Settings, path="task"):
     @property
     def ants_change(self) -> bool:
         """Whether ants are born or die."""
-        return self.life.births or any(feature.kills for feature in used_by(self))
+        return self.life.births or any("aged" in feature.hooks for feature in used_by(self))
 
     def cues_of(self, caste: Caste | None) -> tuple[int, int]:
         """Return the numbers of the outbound and the homing cue of a caste, or of the task."""
@@ -331,9 +293,11 @@ class Task(Settings, path="task"):
         return tuple(sorted({self.cues_of(caste) for caste in self.castes.values()}))
 
     @classmethod
+    @cache
     def named(cls) -> Mapping[str, Task]:
         """Return the named tasks: "paper", "fetching", "foraging" and "queueing"."""
-        return _named()
+        built = (paper, fetching, foraging, queueing)
+        return MappingProxyType({function.__name__: function() for function in built})
 
     @property
     def sees(self) -> Observation:
@@ -416,9 +380,3 @@ def fetching() -> Task:
 def paper() -> Task:
     """Return the paper's task, which is the default everywhere."""
     return Task()
-
-
-@cache
-def _named() -> Mapping[str, Task]:
-    built = (paper, fetching, foraging, queueing)
-    return MappingProxyType({function.__name__: function() for function in built})

@@ -39,18 +39,18 @@ def policy(choose, base=policies.trail_follower):
 
 def walk_on(state):
     """Without food past all food, along the trail, and round at its ends."""
-    if not state.carries and SEES_CUE not in state.view:
+    if not state[0] and SEES_CUE not in state[1:]:
         return LEFT
 
 
 def keep(state):
     """With food nearer to the queen where that can be, and round to the left where it cannot."""
-    if state.carries and SEES_CUE not in state.view:
+    if state[0] and SEES_CUE not in state[1:]:
         return LEFT
 
 
 def turn_with_food(state):
-    return LEFT if state.carries else None
+    return LEFT if state[0] else None
 
 
 def always(action):

@@ -179,11 +179,7 @@ def test_figures_are_added_to_finished_results_without_new_runs(sweep, monkeypat
 WRONG = {
     "no kind": ('kind = "runs"', "", ["kind is None", "runs, colony"]),
     "no measure": (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
-    "unknown": (
-        "shaping =",
-        "shapings =",
-        ["`task.rewards.shapings` is not a setting; choose"],
-    ),
+    "unknown": ("shaping =", "shapings =", ["rewards.shapings` is not a setting; choose shaping"]),
     "unknown key of the file": ("seeds =", "seds =", ["'seds' is not a setting", "choose seeds"]),
     "other kind": ("rollouts", "ants", ["'ants' is not a setting of a sweep of kind 'runs'"]),
     "missing": ("discount = 0.9", "", ["training.discount is missing"]),
@@ -359,7 +355,7 @@ WRONG_EVENTS = {
         ["in [[at]] number 1, in the evaluation, the ants"],
     ),
     "one table": ("[[every]]", "[every]", ["[every] must be [[every]]"]),
-    "number": ("at.1.remove", "at.2.remove", ["the file has no table at.2; add it"]),
+    "number": ("at.1.remove", "at.2.remove", ["the file has no at.2; add it"]),
     "kind": ('kind = "colony"', 'kind = "runs"', ["in a file of kind 'colony'"]),
 }
 

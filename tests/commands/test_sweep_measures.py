@@ -20,7 +20,7 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.measures import registry
+from taichi_ants.measures.measure import MEASURES
 from taichi_ants.studies.points import EVALUATION_SEEDS
 from taichi_ants.studies.sweep import plan, sweep_of, tables
 from taichi_ants.task import Pheromone, Task
@@ -46,7 +46,7 @@ FROZEN = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 def sweep(tmp_path, capsys, monkeypatch):
     """Calls the command on a file of this text, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(registry.MEASURES, "yours", {})
+    monkeypatch.setattr(MEASURES, "yours", {})
 
     def called(text, *more):
         Path("my.toml").write_text(text, "utf-8")
@@ -117,7 +117,7 @@ def test_policies_can_vary(sweep):
 
 
 def test_parameters_of_a_rule_vary_without_a_table(sweep, monkeypatch):
-    monkeypatch.setattr(rules.registry.RULES, "yours", {})
+    monkeypatch.setattr(rules.rule.RULES, "yours", {})
     rules.register("evaporation")(weaker)
     text = FILE.replace("[vary]", '[task]\npheromone.evaporation = "weaker"\n\n[vary]')
     text += "task.rules.weaker.rate = [0.1, 0.5]\n"
@@ -125,7 +125,7 @@ def test_parameters_of_a_rule_vary_without_a_table(sweep, monkeypatch):
     rates = [one.task.rules["weaker"].rate for one in plan({"file": Path("my.toml")}).study.points]
     assert set(rates) == {0.1, 0.5}
     Path("my.toml").write_text(text.replace("rules.weaker", "rules.weakr"))
-    with pytest.raises(AntsError, match=r"no table task\.rules\.weakr; add it"):
+    with pytest.raises(AntsError, match="there is no rule 'weakr'"):
         plan({"file": Path("my.toml")})
 
 
@@ -184,11 +184,7 @@ training.learning_rate = [0.1, 0.2]
         ("episodes = 0", "episodes = 2", ["'trail_follower'", "set episodes = 0"]),
         ('"trail_follower"', '"none.npz"', ["cannot read 'none.npz'"]),
         ('"entropy", "deliveries", "path_length"', '"per_ant"', ["a measure that has a series"]),
-        (
-            "[vary]",
-            "[task.fields.home]\n[vary]\ntask.fields.hom.level = [1]",
-            ["task.fields.hom; add"],
-        ),
+        ("[vary]", "[task.fields.a]\n[vary]\ntask.fields.b.level = [1]", ["no task.fields.b; add"]),
     ],
 )
 def test_mistakes_end_in_one_sentence(old, new, words, sweep):

@@ -10,7 +10,7 @@ from command_lines import ROOT
 
 from taichi_ants import Colony, TrainingConfig, measures, worlds
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.measures import registry
+from taichi_ants.measures.measure import MEASURES
 from taichi_ants.rendering import Snapshot
 from taichi_ants.task import foraging
 
@@ -28,7 +28,7 @@ def test_the_example_prints_what_the_guide_shows(capsys, tmp_path, monkeypatch):
 
 
 def test_your_own_measures_work_as_the_guide_writes_them(monkeypatch):
-    monkeypatch.setattr(registry.MEASURES, "yours", {})
+    monkeypatch.setattr(MEASURES, "yours", {})
     follows = {"sharing": "frozen", "q_values": trail_follower()}
     rule = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
     colony = Colony(worlds.build("double_bridge"), None, rule, ants=9, **follows)

@@ -7,7 +7,7 @@ import pytest
 
 from taichi_ants import AntsError, Colony, TrainingConfig, rollout, train
 from taichi_ants.task import Field, Observation, Task, observations
-from taichi_ants.task.observations import registry
+from taichi_ants.task.observations import observation
 from taichi_ants.worlds import World, paper
 
 CONFIG = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.97)
@@ -15,7 +15,7 @@ CONFIG = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.97)
 
 @pytest.fixture(autouse=True)
 def _no_observation_stays(monkeypatch):
-    monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
+    monkeypatch.setattr(observation.OBSERVATIONS, "yours", dict(observation.OBSERVATIONS.yours))
 
 
 def of_trails(view):

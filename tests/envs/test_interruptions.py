@@ -9,8 +9,6 @@ import pytest
 from gymnasium.error import ResetNeeded
 from interrupts import interrupted_after_launch
 
-from taichi_ants import Task
-from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.forage import HexForageVectorEnv
 
 
@@ -18,15 +16,10 @@ def lone(mode: str) -> Any:
     return HexForageVectorEnv(3, max_steps=4, observation_format="index", autoreset_mode=mode)
 
 
-def colony(mode: str) -> Any:
-    rules, form = Task(delivery="truncates"), {"max_steps": 4, "observation_format": "index"}
-    return HexColonyVectorEnv(6, task=rules, ants=3, autoreset_mode=mode, **form)
-
-
-@pytest.mark.parametrize(("make", "rolls"), [(lone, False), (lone, True), (colony, False)])
+@pytest.mark.parametrize("rolls", [False, True])
 @pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
-def test_vector_environments_know_who_has_ended(make: Any, rolls: bool, mode: str) -> None:
-    ours, theirs = make(mode), make(mode)
+def test_vector_environments_know_who_has_ended(rolls: bool, mode: str) -> None:
+    ours, theirs = lone(mode), lone(mode)
     actions = np.ones((4, ours.num_envs), int)
     for env in (ours, theirs):
         env.reset(seed=3)

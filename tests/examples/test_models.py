@@ -13,7 +13,7 @@ from command_lines import ROOT, numbers_in, run
 from model_script import table
 
 from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.rules import registry
+from taichi_ants.rules.rule import RULES
 
 MODELS = ROOT / "experiments" / "models"
 
@@ -102,15 +102,15 @@ def test_a_table_has_a_line_for_each_condition():
 @pytest.fixture
 def rules_of_scripts(monkeypatch):
     """Forget the rules that a script registers."""
-    monkeypatch.setattr(registry.RULES, "yours", dict(registry.RULES.yours))
+    monkeypatch.setattr(RULES, "yours", dict(RULES.yours))
 
 
 def test_rules_of_the_no_entry_model(rules_of_scripts):
     runpy.run_path(str(MODELS / "no_entry.py"))
-    mark = registry.get("no_entry").function
+    mark = RULES.get("no_entry").function
     for level, carried, expected in ((0, 60, 0), (0, 61, 100), (50, 1000, 100), (200, 61, 200)):
         assert mark(level, carried) == expected
-    wary = registry.get("wary").function
+    wary = RULES.get("wary").function
     empty, food, free, none = (0, 0, 0), (0, 3, 0), (1, 1, 1), (0, 0, 0)
     last = 1 - 2**-32
     cases = (  # codes, levels, repellent, open, nearer, carries, random; action

@@ -11,7 +11,9 @@ import pytest
 from colonies import begun, load
 
 from taichi_ants.reference.geometry import neighbour
+from taichi_ants.reference.observations import OBSERVATIONS
 from taichi_ants.task import Pheromone
+from taichi_ants.task.observations.built_in import BUILT_IN
 from taichi_ants.worlds import World
 
 # Around the ant from behind left on: a rock, a trail, food, nothing, a trail; behind it the queen.
@@ -35,6 +37,10 @@ def state_of(drawing, observation, slot=0, carries=False, **options):
 
 def digits(base, *codes):
     return int("".join(map(str, codes)), base)
+
+
+def test_the_reference_has_each_observation_of_the_package():
+    assert list(OBSERVATIONS) == [one.name for one in BUILT_IN]
 
 
 @pytest.mark.parametrize(

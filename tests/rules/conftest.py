@@ -7,13 +7,13 @@ import importlib
 import own_rules
 import pytest
 
-from taichi_ants.rules import registry
+from taichi_ants.rules.rule import RULES
 
-registry.RULES.yours.clear()
+RULES.yours.clear()
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _registered():
     importlib.reload(own_rules)
     yield
-    registry.RULES.yours.clear()
+    RULES.yours.clear()

@@ -24,19 +24,20 @@ from taichi_ants import (
 )
 from taichi_ants.engines import own_rules as own_rules_of_kernels
 from taichi_ants.interventions import SetTask
-from taichi_ants.reference import own_rules
-from taichi_ants.rules import pick, registry
+from taichi_ants.reference import observations as twins
+from taichi_ants.rules import pick
 from taichi_ants.rules.inputs import KINDS
+from taichi_ants.rules.rule import RULES
 from taichi_ants.task import Choice, Observation, observations
 from taichi_ants.task.model import Model
-from taichi_ants.task.observations import registry as seen
+from taichi_ants.task.observations import observation as seen
 from taichi_ants.testing import check_observation, check_rule
 
 
 @pytest.fixture
 def clean(monkeypatch):
     """Forget the rules that a test registers."""
-    monkeypatch.setattr(registry.RULES, "yours", dict(registry.RULES.yours))
+    monkeypatch.setattr(RULES, "yours", dict(RULES.yours))
 
 
 def test_a_task_names_rules_and_their_parameters():
@@ -84,8 +85,8 @@ def test_pick_draws_by_weights_and_never_what_is_closed(clean):
         assert pick(weights, random) == index, (weights, random)
     runtime.start()
     rules.register("choice")(picks)
-    rows = np.array([[*weights, random] for weights, random, _ in PICKS], np.float64)
-    in_kernels = own_rules_of_kernels._results(rules.get("picks"), rows, [3, 0]) - 1
+    inputs = [{"levels": weights, "random": random} for weights, random, _ in PICKS]
+    in_kernels = own_rules_of_kernels._results(rules.get("picks"), inputs) - 1
     assert in_kernels.tolist() == [index for *_, index in PICKS]
     rng = np.random.default_rng(0)
     drawn = np.bincount([pick((1, 0, 3), one) for one in rng.random(10_000)], minlength=3)
@@ -274,7 +275,7 @@ def wrong_twin(level):
 
 def test_a_rule_that_differs_from_its_twin_is_refused(clean):
     rules.register("evaporation")(same)
-    registry.RULES.yours["same"] = replace(rules.get("same"), function=wrong_twin)
+    RULES.yours["same"] = replace(rules.get("same"), function=wrong_twin)
     check = check_rule("same", inputs=50)
     assert "but its Python function" in check.difference
     assert str(check).startswith("same: 50 drawn inputs and 0 ticks")
@@ -311,7 +312,7 @@ def test_an_observation_is_compared_with_the_reference(monkeypatch):
     observations.register(Observation("homely", 256, homely, reads=("B", "trail")))
     check = check_observation("homely")
     assert str(check) == "homely (reads the fields B and trail): 120 ticks of 2 colonies: equal"
-    monkeypatch.setattr(own_rules, "more_cells", lambda *_: 0)
+    monkeypatch.setattr(twins, "more_cells", lambda *_: 0)
     check = check_observation("homely")
     assert check.ticks < 120
     assert check.difference.startswith("seed 0, tick ")

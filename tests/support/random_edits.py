@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.grid.constants import STREAM_ANT
-from taichi_ants.live import edits
+from taichi_ants.live.choices import sliders
 from taichi_ants.reference.interventions import Interventions as PlainInterventions
 from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.task.constants import EMPTY
@@ -37,7 +38,7 @@ def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[
         cell = int(rng.choice(free if len(free) else there))
         return {"place": {"what": "queen", "cells": [cell]}}
     if kind == "set":
-        known = edits.values(interventions)
+        known = sliders(interventions)
         name = str(rng.choice(list(known)))
         value, least, most, step, path, switch, _ = known[name]
         drawn = float(rng.choice([value, least, most, rng.uniform(least, most)]))
@@ -58,7 +59,7 @@ def apply_to_both(
 
     An episode begins in the world that the interventions have made, with new interventions.
     """
-    change: Any = edits.checked(edit, interventions)
+    change: Any = language.from_dict(edit)
     interventions.apply(change)
     if "episode" in edit:
         colony = plain.colony

@@ -105,44 +105,22 @@ def test_misread_cells():
     assert_counts((codes > 0).sum(axis=0), [0.343, 0.441, 0.189, 0.027])
 
 
-def test_a_task_without_noise_draws_nothing():
-    """A rule that has no effect on these ants leaves their random streams as they are."""
-    one = Colony(worlds.paper(), Task(), PLAIN, 3, 9)
-    two = Colony(worlds.paper(), Task(choice=Choice("greedy"), noise=Noise(0, 0)), PLAIN, 3, 9)
-    for colony in (one, two):
-        colony.begin_episode()
-        colony.tick(30)
-    assert one == two
-
-
-CELLS = Task(choice="deneubourg")
+CELLS, SOFTLY, FROZEN = Task(choice="deneubourg"), Task(choice="softmax"), {"sharing": "frozen"}
+EXPECTED = TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0)
 REFUSED = [
     (
         lambda: Colony(worlds.paper(), CELLS, PLAIN),
         "so ants choose without action values, but sharing is 'shared'",
     ),
     (
-        lambda: Colony(worlds.paper(), CELLS, PLAIN, sharing="frozen", q_values=GREEDY_VALUES),
+        lambda: Colony(worlds.paper(), CELLS, PLAIN, q_values=GREEDY_VALUES, **FROZEN),
         'set sharing to "frozen" and training to None, and leave out q_values',
     ),
     (
-        lambda: train(
-            worlds.paper(),
-            TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0),
-            0,
-            1,
-            task=Task(choice="softmax"),
-        ),
+        lambda: train(worlds.paper(), EXPECTED, 0, 1, task=SOFTLY),
         "learner 'expected_sarsa' takes the mean over epsilon-greedy actions",
     ),
-    (
-        lambda: Colony(
-            worlds.paper(),
-            Task(choice="softmax"),
-            TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0),
-        ),
-        "learner 'expected_sarsa'",
-    ),
+    (lambda: Colony(worlds.paper(), SOFTLY, EXPECTED), "learner 'expected_sarsa'"),
 ]
 
 

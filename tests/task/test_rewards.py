@@ -11,21 +11,17 @@ from taichi_ants.worlds import paper
 
 
 @pytest.mark.parametrize("table", TELLING)
-def test_an_episode_pays_by_the_table_and_ends_with_the_delivery(table):
+def test_runs_pay_by_the_table_and_count_deliveries_only(table):
     """The shortest delivery: 32 steps on trail or towards the queen, a pick-up, a give."""
-    trace = rollout(paper(), trail_follower(), task=Task(rewards=table))
+    task, follower = Task(rewards=table), trail_follower()
+    total = 32 * table.shaping + table.pick_up + table.deliver
+    trace = rollout(paper(), follower, task=task)
     assert (len(trace), trace.delivered.nonzero()[0].tolist()) == (34, [33])
-    assert trace.rewards.sum() == 32 * table.shaping + table.pick_up + table.deliver
-
-
-@pytest.mark.parametrize("table", TELLING)
-def test_a_colony_pays_by_the_table_and_counts_gives_only(table):
+    assert trace.rewards.sum() == total
     training = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
-    colony = Colony(
-        paper(), Task(rewards=table), training, sharing="frozen", q_values=trail_follower()
-    )
+    colony = Colony(paper(), task, training, sharing="frozen", q_values=follower)
     colony.begin_episode()
     colony.tick(34)
     outcome = colony.outcome()
     assert (outcome.deliveries[0, 0], outcome.first_delivery[0, 0]) == (1, 34)
-    assert outcome.returns[0, 0] == 32 * table.shaping + table.pick_up + table.deliver
+    assert outcome.returns[0, 0] == total

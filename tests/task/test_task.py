@@ -23,29 +23,7 @@ from taichi_ants.task import (
     Traffic,
     observations,
 )
-from taichi_ants.task.observations import Observation, registry
-
-
-def test_the_defaults_are_the_rules_of_the_world():
-    task = Task()
-    assert task == Task()
-    assert hash(task) == hash(Task())
-    assert dataclasses.astuple(task.pheromone) == (
-        "linear",
-        None,
-        0.0,
-        "set",
-        250,
-        None,
-        None,
-        "half",
-    )
-    assert dataclasses.astuple(task.rewards) == (0, -1, 1, 3, 10)
-    assert task.life == Life(births=False, lifespan=None, regrowth=None, pile_move_interval=None)
-    assert dataclasses.astuple(task.traffic) == (False, False, False, False)
-    assert not task.turns_at_queen
-    assert (task.observation, task.n_states, task.delivery) == ("paper", 128, "terminates")
-    assert (task.evaporation_in_training, task.evaporation_in_evaluation) == (False, True)
+from taichi_ants.task.observations import Observation, observation
 
 
 def test_a_task_can_be_written_as_json():
@@ -61,7 +39,7 @@ def test_a_task_can_be_written_as_json():
 
 @pytest.fixture
 def _no_observation_stays(monkeypatch):
-    monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
+    monkeypatch.setattr(observation.OBSERVATIONS, "yours", dict(observation.OBSERVATIONS.yours))
 
 
 def always_zero(view):

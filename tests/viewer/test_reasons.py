@@ -8,7 +8,7 @@ from browser import Page, started
 
 from taichi_ants import Colony, Task, TrainingConfig, rules, worlds
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.rules import registry
+from taichi_ants.rules.rule import RULES
 from taichi_ants.task import Caste, Choice, Life, Noise, foraging
 from taichi_ants.task.constants import ACTION_NAMES
 from taichi_ants.viewer import record_colony, save_page
@@ -61,7 +61,7 @@ STORIES = """() => viewer.history.frames.flatMap((frame, moment) =>
 def _registered():
     rules.register("choice")(straight)
     yield
-    del registry.RULES.yours["straight"]
+    del RULES.yours["straight"]
 
 
 @pytest.fixture(scope="module")

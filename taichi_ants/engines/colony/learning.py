@@ -17,7 +17,7 @@ from taichi_ants.learners import model
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
 from taichi_ants.task.constants import BEST_AT, N_ACTIONS, ROW
 from taichi_ants.task.events import Event
-from taichi_ants.task.rules.delivery import step_end, terminates
+from taichi_ants.task.rules.actions import step_end, terminates
 from taichi_ants.task.rules.policy import best_actions
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places

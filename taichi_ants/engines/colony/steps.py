@@ -33,7 +33,7 @@ from taichi_ants.task import constants
 from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, RIGHT
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import OCCASIONS
-from taichi_ants.task.rules import actions, conflicts, delivery, noise, policy, vision
+from taichi_ants.task.rules import actions, conflicts, policy, vision
 
 
 @function
@@ -66,7 +66,7 @@ def observe_by(c, v, cues, w, ant, tick):
         paper_state = see(c, v, cues, w, ant, tick)
         state = paper_state
         if ti.static(v.misreads):
-            state, c.streams[ant] = noise.misread_paper_state(
+            state, c.streams[ant] = vision.misread_paper_state(
                 paper_state, c.streams[ant], v.at["see"], ant_view(c, v, w, ant)
             )
     elif trait(c.carries, ant) == 1:  # compiled twice, each time without what the other load needs
@@ -82,7 +82,7 @@ def observe_with(c, v, cues, w, ant, carries, tick):
     view = view_around(c, v, cues, w, ant, carries, tick)
     paper_state = view.paper_state  # the true one
     if ti.static(v.misreads):
-        c.streams[ant] = noise.misread_view(
+        c.streams[ant] = vision.misread_view(
             view, v.observation, c.streams[ant], v.at["see"], ant_view(c, v, w, ant)
         )
     return paper_state, v.encode(view)
@@ -206,7 +206,7 @@ def read_fields(c, v, view, k, index, standable, tick):
     """Set the levels of cell number k of a view in the pheromones that the observation reads."""
     for i in ti.static(range(len(v.reads))):
         level = level_of(ti.static(v.field(c, v.reads[i])), index, tick)
-        noise.entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
+        vision.entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
 
 
 @function
@@ -555,11 +555,11 @@ def act(c, v, w, chunk, ant, tick):
                 if lays(c, v, ant, 0):
                     index = base + goes
                     deposit(c, v, first, w, ant, index, tick, carried, carries, event, paper_state)
-        elif delivery.can_give(action, paper_state):
+        elif actions.can_give(action, paper_state):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
             put(c.carries, ant, 0)
-            put(c.heading, ant, delivery.heading_after_delivery(heading, c.turns_at_queen))
+            put(c.heading, ant, actions.heading_after_delivery(heading, c.turns_at_queen))
             tally(c, Tally.DELIVERIES, chunk, 1)
             count_apart(c, v, ant, chunk)
             for gave in ti.static(v.at["gave"]):

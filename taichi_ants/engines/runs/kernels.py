@@ -30,7 +30,7 @@ from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.events import Event
-from taichi_ants.task.rules.delivery import step_end
+from taichi_ants.task.rules.actions import step_end
 from taichi_ants.task.rules.policy import chance_of, chance_of_softly, choose, choose_softly
 
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that

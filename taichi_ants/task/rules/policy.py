@@ -22,12 +22,6 @@ def larger(a, b):
 
 
 @ti.func
-def smaller(a, b):
-    """Return the smaller of two floats in one instruction."""
-    return ti.select(a < b, a, b)
-
-
-@ti.func
 def best_value(values):
     """Return the largest of five action values (f32)."""
     return larger(larger(larger(values[0], values[1]), larger(values[2], values[3])), values[4])

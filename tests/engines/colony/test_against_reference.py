@@ -17,7 +17,7 @@ from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, cells_in_view
 from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.task.observations import registry
+from taichi_ants.task.observations import observation
 
 # Each entry needs its own kernels, so that there are few: learner, sharing, observation, dense,
 # and where these are not the paper's the traffic, which trails are seen, and further `MORE`.
@@ -216,7 +216,7 @@ def levels_seen(world, ant):
 @pytest.mark.parametrize("noise", ["misread", pytest.param("", marks=pytest.mark.slow)])
 def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
     """Drawn colonies whose ants observe two fields, in every tick."""
-    monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
+    monkeypatch.setattr(observation.OBSERVATIONS, "yours", dict(observation.OBSERVATIONS.yours))
     monkeypatch.setitem(OBSERVATIONS, "levels", levels_seen)
     observations.register(Observation("levels", 128, with_levels, reads=("a", "B")))
     hidden = shown = 0
@@ -243,7 +243,7 @@ def test_each_learner_and_observation_is_compared():
 @pytest.fixture
 def seen_strangers(monkeypatch):
     """The observation, registered for one test."""
-    monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
+    monkeypatch.setattr(observation.OBSERVATIONS, "yours", dict(observation.OBSERVATIONS.yours))
     monkeypatch.setitem(OBSERVATIONS, "other_nest_ants", strangers_seen)
     return observations.register(Observation("other_nest_ants", 54, with_strangers))
 
