@@ -143,7 +143,7 @@ class ReferenceColony:
     @property
     def q_values(self) -> np.ndarray:
         """A copy of the table, float32 (n_states, 5), or of all tables, (slots, n_states, 5)."""
-        tables = np.array([learner.table() for learner in self.learners])
+        tables = np.array([learner.rows for learner in self.learners], np.float32)
         if self.sharing == "independent":
             return tables
         axes = [n for n in (len(self.world.queens), len(self.castes)) if n > 1]

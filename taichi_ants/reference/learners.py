@@ -44,10 +44,6 @@ class ReferenceLearner:
         self.begin_run()
         self.begin()
 
-    def table(self) -> np.ndarray:
-        """Return a copy of the table, float32 (n_states, 5)."""
-        return np.array(self.rows, np.float32)
-
     def begin_run(self) -> None:
         """Reset the memory that lasts through all episodes."""
 

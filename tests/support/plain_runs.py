@@ -46,7 +46,7 @@ class Run:
     def __init__(self, colony: ReferenceColony, trace: list[Transition]) -> None:
         self.colony, self.trace = colony, trace
         self.learner = colony.learners[0]
-        self.q_values = self.learner.table()
+        self.q_values = colony.q_values[0]
         self.model = self.learner.model
         self.epsilon = colony.epsilon
         self.rng_state = colony.streams[0].state

@@ -28,5 +28,5 @@ def transition(
 
 def values_of(learner):
     """The values that are not zero, by state and action."""
-    table = learner.table()
+    table = np.array(learner.rows)
     return {(int(s), int(a)): float(table[s, a]) for s, a in np.argwhere(table)}
