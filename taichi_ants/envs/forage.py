@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -15,7 +16,6 @@ from taichi_ants.arguments import checked_share
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.rollout import Rollout, checked_plan
 from taichi_ants.envs.vector import (
     ACTION_MASKS,
     METADATA,
@@ -26,11 +26,14 @@ from taichi_ants.envs.vector import (
     Rules,
     Step,
     Worlds,
+    checked_actions,
 )
 from taichi_ants.errors import check_one_of, checked_whole, shown, whole
 from taichi_ants.features.support import CHOICE, LONE
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
+from taichi_ants.learners.policies import checked_table, frozen_policy
+from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, N_ACTIONS
 
 SUPPORTS = LONE - CHOICE - {"choice.rule=softmax"}  # actions are given
@@ -214,6 +217,30 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         return None if self.render_mode is None else self._ants.draw(0)
 
 
+class Rollout(NamedTuple):
+    """The results of several steps of n environments; row t of each array is step t.
+
+    Attributes:
+        observations: The observations before each step, and after the last one: (steps + 1, n, ...)
+            of the dtype of the observation space. `observations[1:]` are those that `step` returns.
+        actions: The actions taken, int64 (steps, n).
+        rewards: float64 (steps, n).
+        terminated, truncated: bool (steps, n).
+        events: The results of the actions, codes of `Event` as uint8 (steps, n). `NONE` in steps
+            that only begin an episode, or of environments that wait for a reset.
+        final_observations: The last observation of each episode that ended, (episodes, ...), in
+            the order of `np.argwhere(terminated | truncated)`.
+    """
+
+    observations: np.ndarray
+    actions: np.ndarray
+    rewards: np.ndarray
+    terminated: np.ndarray
+    truncated: np.ndarray
+    events: np.ndarray
+    final_observations: np.ndarray
+
+
 class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct bases
     """Many ants, each alone in its world; a single launch steps all of them.
 
@@ -275,7 +302,7 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
             AntsError: The policy or another argument is not allowed.
         """
         waiting, ants, n = self._waiting("rollout"), self._ants, self.num_envs
-        length, actions, q_values = checked_plan(policy, steps, n, ants.task)
+        length, actions, q_values = _checked_plan(policy, steps, n, ants.task)
         epsilon, choices = checked_share("epsilon", epsilon), None
         shape, table = (length, n), ants.shown.table
         into = Rollout(
@@ -307,3 +334,26 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         if ants.mode is AutoresetMode.SAME_STEP:
             return into._replace(final_observations=ants.shown.show(finals[over]))
         return into._replace(final_observations=into.observations[1:][over])
+
+
+def _checked_plan(
+    policy: Any, steps: int | None, n: int, task: Task
+) -> tuple[int, np.ndarray | None, np.ndarray | None]:
+    """Return the number of steps, and either actions, int64 (steps, n), or action values.
+
+    Raises:
+        AntsError, InvalidAction: The policy or the number of steps is not allowed.
+    """
+    if isinstance(policy, (str, os.PathLike)):
+        table = frozen_policy(policy, task.observation)
+    else:
+        try:
+            plan = np.asarray(getattr(policy, "q_values", policy))
+        except ValueError:  # lists of several lengths
+            plan = np.empty(0)
+        if plan.dtype.kind in "iu":
+            length = steps or max(1, np.atleast_1d(plan).shape[0])
+            actions = checked_actions(plan, (length, n))
+            return length, np.ascontiguousarray(actions, np.int64), None
+        table = checked_table(policy, task)
+    return checked_whole("steps", steps), None, table

@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from gymnasium.error import ResetNeeded
+from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.spaces import Discrete
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -17,7 +17,6 @@ from gymnasium.vector.utils import batch_space
 
 from taichi_ants.arguments import check_ranges, checked_max_steps, checked_task, checked_world
 from taichi_ants.envs.formats import ObservationFormat, Shown
-from taichi_ants.envs.rollout import checked_actions
 from taichi_ants.errors import AntsError, as_array, check_one_of, shown
 from taichi_ants.task import Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, N_STATES, PICK_UP
@@ -287,3 +286,21 @@ def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
     for number in seeds:
         seeding.np_random(number)  # raises Gymnasium's error for negative seeds
     return seeds
+
+
+def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return actions as an array of integers of a shape; InvalidAction for others."""
+    try:
+        chosen = np.asarray(actions)
+    except ValueError:  # lists of several lengths
+        chosen = np.empty(0)
+    if chosen.shape != shape or chosen.dtype.kind not in "iu":
+        raise InvalidAction(
+            f"the actions are {shown(actions)}; they must be an array of an integer type and of "
+            f"shape {shape}."
+        )
+    # A negative number is a large one without its sign.
+    if chosen.view(chosen.dtype.str.replace("i", "u")).max() >= N_ACTIONS:
+        wrong = chosen[(chosen < 0) | (chosen >= N_ACTIONS)][0]
+        raise InvalidAction(f"an action is {wrong}; it must be 0, 1, 2, 3 or 4.")
+    return chosen

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import arguments, runtime
+from taichi_ants import arguments
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.runs.engine import Progress, Runs
+from taichi_ants.engines.runs.engine import Runs
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.features.support import BASE, CASTES, CHOICE, FOODS, refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
@@ -36,10 +36,6 @@ def record(
     max_steps: int = EPISODE_STEPS,
     task: Task | None = None,
     epsilon: float = 0.0,
-    threads: int | None = None,
-    *,
-    arch: str | None = None,
-    progress: Progress | None = None,
 ) -> Dataset:
     """Return the transitions of single ants, one run per seed, each ant alone in its world.
 
@@ -53,7 +49,7 @@ def record(
         task: The rules; None is the paper's task. Learners use its evaporation in training, other
             policies its evaporation in evaluation.
         epsilon: The exploration rate of a table; a learner has its own.
-        world, episodes, seeds, max_steps, threads, arch, progress: As in `train`.
+        world, episodes, seeds, max_steps: As in `train`.
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
@@ -63,7 +59,6 @@ def record(
     numbers = arguments.checked_seeds(seeds)
     episodes = checked_whole("episodes", episodes)
     epsilon = arguments.checked_share("epsilon", epsilon)
-    runtime.start(threads, arch)
     facts: dict[str, Any]
     if isinstance(behaviour, TrainingConfig):
         configs = arguments.checked_configs(behaviour, task)
@@ -85,14 +80,12 @@ def record(
         runs = Runs.following(world, task, max_steps, *which)
     pieces = [
         {**{n: steps[there] for n, there in _FROM_TRACE.items()}, "agent": 0 * steps["runs"]}
-        for steps in runs.record(episodes, progress)
+        for steps in runs.record(episodes)
     ]
     return _dataset(pieces, world=world, task=task, seeds=numbers, behaviour=facts)
 
 
-def record_colony(
-    colony: Colony, episodes: int = 1, ticks: int = 1000, progress: Progress | None = None
-) -> Dataset:
+def record_colony(colony: Colony, episodes: int = 1, ticks: int = 1000) -> Dataset:
     """Return the transitions of a colony's ants while it runs more episodes of `ticks` each.
 
     A run is a world of the colony. An episode of the data ends when its ant dies or the colony's
@@ -120,8 +113,6 @@ def record_colony(
             before, tables = tables, colony.q_values
             piece = _tick(colony, tables, before)
             pieces.append({**piece, "episode": np.full(len(piece["run"]), episode)})
-            if progress is not None:
-                progress((episode + (tick + 1) / ticks) / episodes)
             if not len(piece["run"]) and tick + 1 < ticks:  # all ants are dead
                 colony.tick(ticks - tick - 1)
                 break

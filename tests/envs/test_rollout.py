@@ -12,9 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from taichi_ants import AntsError, Pheromone, Task, TrainingConfig, task, train, worlds
-from taichi_ants.envs.forage import HexForageVectorEnv
+from taichi_ants.envs.forage import HexForageVectorEnv, Rollout
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.rollout import Rollout
 from taichi_ants.learners.policies import action_probabilities, save_policy, trail_follower
 from taichi_ants.task import Noise
 

@@ -283,7 +283,7 @@ class Runs:
         return seconds
 
     def record(
-        self, episodes: int, progress: Progress | None = None, tables: np.ndarray | None = None
+        self, episodes: int, tables: np.ndarray | None = None
     ) -> Iterator[dict[str, np.ndarray]]:
         """Yield the steps of the next episodes, in pieces, and update the state.
 
@@ -299,7 +299,7 @@ class Runs:
         most_runs = MAX_ROLLOUT_STEPS // max(max_steps, self.world.grid.size // 10)
         runs_each = max(1, min(len(self), most_runs))
         episodes_each = max(1, MAX_ROLLOUT_STEPS // (runs_each * max_steps))
-        for runs, part in pieces(len(self), episodes, runs_each, episodes_each, progress):
+        for runs, part in pieces(len(self), episodes, runs_each, episodes_each):
             n_runs, n_episodes = runs.stop - runs.start, part.stop - part.start
             capacity = n_episodes * max_steps  # the most steps of a run
             trace = np.empty((n_runs * capacity, len(TRACE)), np.int32)

@@ -70,21 +70,15 @@ def train(
     outcomes = (np.zeros((len(configs), len(seeds), 0), dtype=np.int32),) * 3
     state = RunState.initial(configs, seeds, task.n_states)
     start = TrainingResult(world, configs, seeds, max_steps, task, *outcomes, 0.0, state)
-    return _train(start, episodes, threads, arch, progress)
+    runtime.start(threads, arch)
+    return _train(start, episodes, progress)
 
 
-def continue_training(
-    result: TrainingResult,
-    episodes: int,
-    threads: int | None = None,
-    *,
-    arch: str | None = None,
-    progress: Progress | None = None,
-) -> TrainingResult:
+def continue_training(result: TrainingResult, episodes: int) -> TrainingResult:
     """Return a new result after training every run of a result for more episodes.
 
     It equals, bit for bit, the result of a single training with the sum of the episodes; `seconds`
-    is the time of the new ones. Other arguments and errors are those of `train`.
+    is the time of the new ones. Errors are those of `train`.
     """
     expect("result", result, TrainingResult)
     arguments.checked_configs(result.configs)
@@ -97,19 +91,14 @@ def continue_training(
             "first episode."
         )
     copies = RunState(**{name: array.copy() for name, array in vars(state).items()})
-    return _train(replace(result, state=copies), episodes, threads, arch, progress)
+    return _train(replace(result, state=copies), episodes)
 
 
 def _train(
-    result: TrainingResult,
-    episodes: int,
-    threads: int | None,
-    arch: str | None,
-    progress: Progress | None,
+    result: TrainingResult, episodes: int, progress: Progress | None = None
 ) -> TrainingResult:
     """Return what `continue_training` returns, but change the state of the given result."""
     episodes = checked_whole("episodes", episodes)
-    runtime.start(threads, arch)
     configs, seeds, seconds = result.configs, result.seeds, 0.0
     outcomes = np.zeros((len(OUTCOMES), len(configs), len(seeds), episodes), dtype=np.int32)
     first = 0
@@ -146,7 +135,6 @@ def evaluate(
     threads: int | None = None,
     *,
     arch: str | None = None,
-    progress: Progress | None = None,
 ) -> Rollouts:
     """Return the outcomes of episodes in which ants follow fixed policies and do not learn.
 
@@ -157,7 +145,7 @@ def evaluate(
         seeds: One seed for all tables, or one per index of the tables' last leading axis. A single
             table takes any number of seeds, which are then the first axis of the result.
         epsilon: Probability of a random action.
-        world, max_steps, task, threads, arch, progress: As in `train`.
+        world, max_steps, task, threads, arch: As in `train`.
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
@@ -174,7 +162,7 @@ def evaluate(
     flat = tables.reshape(-1, *tables.shape[-2:])
     runs = Runs.following(world, task, max_steps, flat, run_seeds, range(rollouts), epsilon)
     outcomes = np.empty((3, len(runs), rollouts), np.int32)
-    runs.do_episodes(outcomes, progress)
+    runs.do_episodes(outcomes)
     returns, steps, deliveries = outcomes.reshape(3, *shape, rollouts)
     of_tables = tuple(run_seeds[: shape[-1] if shape else 1].tolist())
     return Rollouts(returns, steps, deliveries, of_tables)

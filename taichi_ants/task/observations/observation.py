@@ -80,7 +80,7 @@ class Observation:
     def __reduce__(self) -> Any:
         # A pickle holds only the name, because reading it requires the registered observation.
         registered = self.name in OBSERVATIONS.names() and OBSERVATIONS.get(self.name) is self
-        return (OBSERVATIONS.get, (self.name,)) if registered else object.__reduce_ex__(self, 2)
+        return (_registered, (self.name,)) if registered else object.__reduce_ex__(self, 2)
 
     @property
     def parts(self) -> tuple[int, ...]:
@@ -112,6 +112,11 @@ def of_codes(
 OBSERVATIONS: Registry[Observation] = Registry(
     "observation", "taichi_ants.task.observations.register", {}
 )
+
+
+def _registered(name: str) -> Observation:
+    """Return an observation for a pickle, which would otherwise hold the registry."""
+    return OBSERVATIONS.get(name)
 
 
 def register(observation: Observation) -> Observation:
