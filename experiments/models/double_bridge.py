@@ -80,7 +80,7 @@ def interval(which: np.ndarray) -> str:
 
 def main(settings: argparse.Namespace) -> None:
     """Print the table, and write the figure and its numbers."""
-    files.check_writable_folder(settings.out)
+    files.check_writable_file(settings.out / "double_bridge.csv")
     rows, lines = [], []
     with style.styled(), progress_bar("Colonies on bridges") as progress:
         figure = style.new_figure(4.4)

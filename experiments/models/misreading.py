@@ -46,7 +46,7 @@ def deliveries(rules: Task, rate: float, seeds: int, episodes: int, ticks: int) 
 
 def main(settings: argparse.Namespace) -> None:
     """Print the table, and write the figure and its numbers."""
-    files.check_writable_folder(settings.out)
+    files.check_writable_file(settings.out / "misreading.csv")
     rows, found = [], []
     with progress_bar("Colonies that misread") as progress:
         for number, rate in enumerate(RATES):

@@ -34,7 +34,7 @@ def run(script: str, doc: str | None, measure: Callable[[list[int]], Results]) -
     options = parser.parse_args()
 
     def main() -> None:
-        folder = files.check_writable_folder(options.out)
+        folder = files.check_writable_file(options.out / f"{name}.csv").parent
         numbers, summary, title, draw = measure(list(range(options.seeds)))
         files.write_csv(folder / f"{name}.csv", numbers, list(numbers[0]))
         print(table(summary))

@@ -26,6 +26,10 @@ STREAM_FORAGER = 8  # number: colony * 2**32 + the ant of experiments/utility.py
 STREAM_INTERVENTION = 9  # number: 0; for ants that an intervention adds
 STREAM_TRAIT = 10  # number: the ant; for its response threshold
 STREAM_INDIVIDUAL = 11  # number: the ant; for its exploration rate and its input `trait`
+
 MAX_STEPS = 10_000_000  # the most ticks of an episode
-MAX_CASTES, MAX_NESTS = 16, 7  # the nest is in three bits of an ant's mark; 0 means no ant
+MAX_CASTES = 16
+MAX_NESTS = 7  # its number is in three bits of an ant's mark, of which 0 means no ant
+MAX_FOOD_KINDS = 8
+MOST_REWARD = 1000  # the largest absolute reward of an event
 TRAIL = "trail"  # the name of the first pheromone
