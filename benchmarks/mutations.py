@@ -102,8 +102,8 @@ MUTATIONS = [
         "FOODS[0 * snapshot.ant_foods]",
         RASTER,
     ),
-    ("engines/colony/state.py", '{"nest": self.n_nests, "caste"', '{"caste"', NESTS),
-    ("engines/colony/state.py", "np.where(carries, of_ants", "np.where(~carries, of_ants", NESTS),
+    ("engines/colony/state.py", "n > 1 and per != ANT", "per not in (ANT, NEST)", NESTS),
+    ("engines/colony/state.py", "np.where(carries, self.kinds", "np.where(carries, 0", NESTS),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
     ("task/rules/conflicts.py", "(other, tick) > key", "(other, tick) < key", CONFLICTS),
@@ -243,7 +243,7 @@ MUTATIONS = [
     ("engines/colony/timetable.py", "        done |= worlds", "        done &= worlds", PROTOCOL),
     ("engines/colony/interventions.py", "nest)) + 0.5)", "nest)))", PROTOCOL),
     ("engines/colony/interventions.py", "max(episode, 0))", "0)", PROTOCOL),
-    ("engines/colony/state.py", "if stale.any():", "if False:", PROTOCOL),
+    ("engines/colony/stepping.py", "if stale.any():", "if False:", PROTOCOL),
     ("protocol.py", "range(self.interval, length", "range(0, length", PROTOCOL),
     ("protocol.py", "value > self.above", "value >= self.above", PROTOCOL),
     # Learners.
@@ -312,8 +312,8 @@ MUTATIONS = [
     ("viewer/recorder.py", "[new] = False", "[new] = True", RECORDING),
     (
         "viewer/recorder.py",
-        "weights_of(castes, ants[pair])",
-        "weights_of(castes, pair * 0 + 1)",
+        "castes, ants[pair])",
+        "castes, pair * 0 + 1)",
         RECORDING,
     ),
     ("viewer/frames.py", '"u2" if size < 2**16', '"u2" if size < 2**17', RECORDING),
@@ -323,7 +323,6 @@ MUTATIONS = [
     ("live/server.py", "not (knows or (", "not (True or (", SERVER),
     ("live/server.py", "len(host) == 1 and host[0] in hosts", "len(host) == 1", SERVER),
     ("live/server.py", "self._runs and bool(self.pages)", "self._runs", SERVER),
-    ("live/server.py", "self._joined < _MOST_PAGES", "self._joined <= _MOST_PAGES", SERVER),
     ("live/server.py", 'request.get("do") in _CHANGES', "False", SERVER),
     ("live/server.py", "in_a_row or before.to_bytes() == session.to_bytes()", "in_a_row", SERVER),
     # Worlds and the grid.

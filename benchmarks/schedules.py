@@ -26,7 +26,6 @@ WAYS = {
     "by chunk, one thread": ("by_chunk", 1),
     "by chunk, barrier": ("by_chunk", 0),
 }
-threads_for = stepping.threads_for
 _STEPS = 2_000_000  # of ants, in one measurement
 
 
@@ -44,12 +43,14 @@ def pace(colony: Colony, way: str) -> float:
     """Return million steps of ants per second."""
     _, threads = WAYS[way]
     stepping.ThreadChoice.plan = lambda choice, ticks, most: (ticks, threads or most)
-    stepping.threads_for = (lambda n_worlds: 1) if way == NEIGHBOURS else threads_for
     steps = colony.ants * len(colony.seeds)
     most = 100 if way.endswith("barrier") else 10_000  # threads can wait long
     ticks = max(2, min(most, _STEPS // steps))
     began = time.perf_counter()
-    colony.tick(ticks)
+    if way == NEIGHBOURS:
+        colony._launch_ticks(ticks, parts=len(colony.seeds))
+    else:
+        colony.tick(ticks)
     return ticks * steps / (time.perf_counter() - began) / 1e6
 
 

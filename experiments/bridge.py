@@ -142,7 +142,7 @@ def tables(plan: Plan, results: Results) -> str:
     table = shown.rows(found, plan.study.seeds, plan.ticks)
     files.write_csv(results.folder / "shares.csv", table, list(table[0]))
     if results.figures:
-        folder = files.check_writable_folder(results.folder / "figures")
+        folder = results.folder / "figures"
         shown.draw(folder / "bridge.png", found, plan.ticks)
         shown.draw_late(folder / "late.png", found, plan.ticks)
     return shown.report(found, plan.ticks)

@@ -318,9 +318,8 @@ def tables(plan: Plan, runs: Runs) -> str:
                 **{"seed": seeds[run], "episodes": point.episodes, "ticks": point.ticks},
                 "deliveries_per_1000_ticks": values[condition]["deliveries"][run],
             }
-            path = files.check_writable_folder(folder / "policies")
-            path /= f"{condition.world_kind}_{condition.rules}_{condition.ants}.npz"
-            save_policy(path, q_values[run], metadata, point.task.observation)
+            name = f"{condition.world_kind}_{condition.rules}_{condition.ants}.npz"
+            save_policy(folder / "policies" / name, q_values[run], metadata, point.task.observation)
     parts: dict[str, Any] = {"drawings": [], "players": []}
     if runs.figures:
         style.save_all(draw_all(rows), folder / "figures")

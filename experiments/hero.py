@@ -24,14 +24,13 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from PIL import Image
     from scipy.ndimage import gaussian_filter
 
-    from taichi_ants import Colony, Interventions, TrainingConfig, World, task
+    from taichi_ants import Colony, Interventions, TrainingConfig, World, files, task
     from taichi_ants.grid.hexgrid import AxialGrid, centre_of, cube
     from taichi_ants.interventions import Place
     from taichi_ants.records import Snapshot
     from taichi_ants.rendering import text
     from taichi_ants.rendering.colours import Mark, channels
     from taichi_ants.rendering.rasteriser import draw_marks, marks
-    from taichi_ants.rendering.writers import write
     from taichi_ants.studies.command_line import Parser, run_command
     from taichi_ants.task.constants import FOOD, OBSTACLE
     from taichi_ants.task.events import Event
@@ -353,7 +352,7 @@ def make_hero(settings: argparse.Namespace) -> None:
         content = io.BytesIO()
         options = {"save_all": True, "append_images": others, "duration": 1000 // FPS, "loop": 0}
         first.save(content, "WEBP", **options, quality=QUALITY, method=4)
-        write(path, content.getvalue())
+        files.write_bytes(path, content.getvalue())
         print(f"{path}: {path.stat().st_size // 1000} kB")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from numbers import Real
 
 import numpy as np
@@ -14,12 +14,13 @@ from taichi_ants.errors import (
     check_one_of,
     checked_flag,
     checked_whole,
+    count,
     entries_of,
     expect,
     refuse,
     shown,
 )
-from taichi_ants.features.support import LONE, refuse_unsupported
+from taichi_ants.features.support import BASE, CASTES, COLONY, LONE, refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
@@ -48,6 +49,35 @@ def check_ranges(worlds: Sequence[World]) -> None:
     ranges = {world.ranges for world in worlds}
     if len(ranges) > 1:
         raise AntsError(f"the worlds have the ranges {sorted(ranges)}; give worlds of one size.")
+
+
+def checked_worlds(
+    world: World | Sequence[World], n_seeds: int, learns: bool, n_kinds: int, n_nests: int = 0
+) -> tuple[World, ...]:
+    """Return one world per seed for a colony with some kinds of food, and nests, if not 0.
+
+    AntsError if their number is wrong, or one does not fit.
+    """
+    given = entries_of(world) or [world] * n_seeds
+    worlds = tuple(checked_world(one, learns, "a colony", COLONY) for one in given)
+    if len(worlds) != n_seeds:
+        raise AntsError(
+            f"there are {len(worlds)} worlds for {n_seeds} seeds; give one world per seed."
+        )
+    check_ranges(worlds)
+    n_nests = n_nests or worlds[0].n_nests
+    for one in worlds:
+        if one.n_nests != n_nests:
+            raise AntsError(
+                f"a world has {count(one.n_nests, 'nest')}, but another one {n_nests}; all worlds "
+                "of a colony must have the same number."
+            )
+        if one.n_food_kinds > n_kinds:
+            raise AntsError(
+                f"the world has {count(one.n_food_kinds, 'kind')} of food, but the task "
+                f"{n_kinds}; add the others to `task.foods`."
+            )
+    return worlds
 
 
 def checked_task(
@@ -99,6 +129,53 @@ def check_learner(config: TrainingConfig, task: Task, sharing: str = "independen
             f"learner {learner.name!r} has no TD error that can be summed over ants, so ants "
             'cannot share its table; set sharing to "independent".'
         )
+
+
+def checked_training(
+    training: TrainingConfig | None, task: Task, sharing: str, has_table: bool
+) -> TrainingConfig | None:
+    """Return the training of a colony, complete, or None if there are no action values."""
+    learns = sharing != "frozen"
+    if training is None and not learns and not has_table:
+        if task.choice.needs_table:
+            refuse_unsupported("a colony with given actions", task.uses(), BASE - CASTES)
+        return None
+    if not task.choice.needs_table:
+        raise AntsError(
+            f"`task.choice.rule` is {task.choice.rule!r}, so ants choose without action values, "
+            f"but sharing is {shown(sharing)} and there is a training or q_values; set sharing to "
+            '"frozen" and training to None, and leave out q_values.'
+        )
+    expect("training", training, TrainingConfig)
+    assert training is not None
+    (training,) = checked_configs(training)
+    policies = [caste.policy for caste in task.castes.values()] or [None]
+    if not (learns or has_table) and None in policies:
+        raise AntsError(
+            "sharing is 'frozen', but q_values is None; give the action values that the ants "
+            "follow, because they do not learn."
+        )
+    if learns:
+        check_learner(training, task, sharing)
+    return training
+
+
+def checked_tables(q_values: np.ndarray, n_worlds: int, axes: Mapping[str, int]) -> np.ndarray:
+    """Return tables (..., n_states, 5) of a colony with a leading axis W, and one of all `axes`.
+
+    AntsError unless there is one table, one per world, or one for each place on the axes.
+    """
+    leading, form = q_values.shape[:-2], q_values.shape[-2:]
+    owners = {(n_worlds, *axes.values()): " and ".join(axes), (n_worlds,): "world"}
+    if leading and leading not in owners:
+        listed = [
+            f"{(*shape, *form)} for one table per {owners[shape]}"
+            for shape in sorted(owners, key=len)
+        ]
+        raise AntsError(
+            f"q_values has shape {q_values.shape}; give {form}, {', or '.join(listed)}."
+        )
+    return q_values.reshape(*leading[:1], -1, *form)
 
 
 def checked_configs(

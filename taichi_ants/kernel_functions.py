@@ -47,16 +47,21 @@ def while_compiling(function: Function) -> Function:
     return function
 
 
-class _Late:
-    """A module that is imported at its first use, when a kernel compiles."""
+class Named:
+    """An object with attributes that a function returns by name, while a kernel compiles."""
 
-    def __init__(self, load: Callable[[], Any]) -> None:
-        self._load = load
+    _data_oriented = True  # Taichi requires it of objects whose attributes kernels read
+
+    def __init__(self, read: Callable[[str], Any]) -> None:
+        self._read = read
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._load(), name)
+        if name.startswith("_"):  # of Python
+            raise AttributeError(name)
+        return self._read(name)
 
 
-ti: Any = _Late(lambda: import_module("taichi"))
-bits: Any = _Late(lambda: import_module("taichi_ants.arithmetic.random_bits"))
-numbers: Any = _Late(lambda: import_module("taichi_ants.arithmetic.numbers"))
+# Modules that are imported at their first use, when a kernel compiles.
+ti: Any = Named(lambda name: getattr(import_module("taichi"), name))
+bits: Any = Named(lambda name: getattr(import_module("taichi_ants.arithmetic.random_bits"), name))
+numbers: Any = Named(lambda name: getattr(import_module("taichi_ants.arithmetic.numbers"), name))

@@ -50,7 +50,7 @@ def run(
     options = parser.parse_args()
 
     def main() -> None:
-        folder = files.check_writable_folder(options.out)
+        folder = files.check_writable_file(options.out / f"{name}.csv").parent
         found = Results(*measure(list(range(options.seeds))))
         files.write_csv(folder / f"{name}.csv", found.numbers, list(found.numbers[0]))
         print(table(found.summary))

@@ -16,7 +16,6 @@ from paper.baselines import Baseline
 from paper.claims import Audit, headlines
 from paper.comparison import DEFINITIONS, Comparison, counts
 from paper.table2 import Line, example_name, summarise_behaviours
-from taichi_ants import files
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
@@ -81,8 +80,7 @@ def begin(
     drawn = process.begin(figures.save_all, comparison, baselines, folder / "figures")
     calls: dict[Any, process.Begun] = {"figures": drawn}
     for (row, run, point, *_), episode in zip(examples, played if renders else (), strict=False):
-        path = files.check_writable_folder(folder / "renders")
-        path /= f"{example_name(comparison, row, run)}.gif"
+        path = folder / "renders" / f"{example_name(comparison, row, run)}.gif"
         # The animation shows the name of the episode next to the world.
         named = replace(episode, name=BEHAVIOURS[comparison.behaviours[row, run]])
         title = f"{comparison.rows[row].variant.label}, {point.task.delivery}"

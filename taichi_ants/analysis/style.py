@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from taichi_ants.files import check_writable_folder, write_atomically
+from taichi_ants.files import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -103,14 +103,9 @@ def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
 
 
 def save_all(figures: Mapping[str, Figure], folder: str | Path) -> None:
-    """Write figures as PNG files into a folder, which is created if needed.
-
-    Raises:
-        AntsError: The folder or a file in it cannot be written.
-    """
-    folder = check_writable_folder(folder)
+    """Write figures as PNG files into a folder; AntsError if a file cannot be written."""
     for name, figure in figures.items():
-        save(figure, folder / f"{name}.png")
+        save(figure, Path(folder, f"{name}.png"))
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.errors import AntsError, count
@@ -124,20 +123,16 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     world = worlds.build(settings.world, **{"seed": settings.seed, **given.get("world", {})})
     policy = load_policy(settings.policy) if settings.policy else None
     task = rules(settings, policy)
-    learns_nothing = not task.choice.needs_table
-    if learns_nothing and (policy or given.get("training")):
-        raise AntsError(
-            f"--task.choice.rule is {task.choice.rule}, by which ants choose without learning; "
-            "leave out --policy and the options of --training."
-        )
+    training = given.get("training", {})
+    learns = task.choice.needs_table or bool(policy or training)
     names = ("ants", "capacity", "start", "sharing", "threads", "arch")
     options: dict[str, Any] = {name: getattr(settings, name) for name in names}
     seeds = range(settings.seed, settings.seed + settings.colonies)
     options["q_values"] = policy.q_values if policy else None
-    training = None if learns_nothing else _LEARNING.replace(**given.get("training", {}))
-    if learns_nothing and settings.sharing == "shared":  # the default
+    config = _LEARNING.replace(**training) if learns else None
+    if not learns and settings.sharing == "shared":  # the default
         options["sharing"] = "frozen"
-    colony = Colony(world, task, training, seeds, **options)
+    colony = Colony(world, task, config, seeds, **options)
     colony.begin_episode()
     return colony
 
@@ -165,7 +160,6 @@ def live(
     `save` is the file of the colony, which is saved even if drawing fails. `render` is a picture
     (.png) of the end, or an animation (.gif).
     """
-    from taichi_ants.files import check_writable_folder
     from taichi_ants.rendering import colony_snapshots, frames, save_animation
     from taichi_ants.rendering.writers import is_picture
 
@@ -181,7 +175,6 @@ def live(
     except (AntsError, OSError) as raised:
         error = raised  # the colony is intact, because drawing happens between ticks
     if save is not None:
-        check_writable_folder(Path(save).parent)
         colony.save(save)
     if error is not None:
         raise error

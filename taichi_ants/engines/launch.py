@@ -28,14 +28,11 @@ class Launch:
     in place; whole numbers, as i32, or u64 for `np.uint64`; and floats, as f32.
     """
 
-    def __init__(self, kernel_of: Callable[[Any], Callable[[Any], None]]) -> None:
+    def __init__(self, kernel_of: Callable[[Any], Any]) -> None:
         self._kernel_of = kernel_of
         self._taichi: Any = lambda: None  # the Taichi runtime for which the launch was prepared
         # Not a reference to its program, which would outlive a reset of Taichi.
         self._compiled: Any = None
-        self._kernel: Any
-        self._context: Any
-        self._pack: Any
         self._known: dict[str, Any] = {}  # the present values of the pack and the context
         self._flushing = runtime.Flushing()
 

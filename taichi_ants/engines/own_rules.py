@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import taichi as ti
+from taichi.lang.impl import subscript
 
 from taichi_ants import runtime
 from taichi_ants.arithmetic.numbers import exponential, logarithm, power
@@ -99,11 +100,8 @@ def bounded_function(rule: Rule) -> Callable[..., Any]:
 def difference(rule: Rule, n: int = TRIES) -> str:
     """Return the first difference of a rule and its Python function for n drawn inputs, or ""."""
     drawn = list(tries(rule, n))
-    names = (*rule.inputs, *rule.parameters)
-    lengths = [rule.inputs[name].length if name in rule.inputs else 0 for name in names]
-    rows = [[x for name in names for x in np.atleast_1d(values[name])] for values in drawn]
     try:
-        results = _results(rule, np.array(rows, np.float64).reshape(n, -1), lengths)
+        results = _results(rule, drawn)
     except Exception as error:
         return last_line(error)
     for values, result in zip(drawn, results.tolist(), strict=True):
@@ -118,26 +116,21 @@ def difference(rule: Rule, n: int = TRIES) -> str:
     return ""
 
 
-@ti.func
-def _entry(rows: ti.template(), row, column):
-    """Return an entry of an array of rows."""
-    return rows[row, column]
-
-
-def _results(rule: Rule, rows: np.ndarray, lengths: list[int]) -> np.ndarray:
-    """Return the results of a rule in a kernel for rows of all arguments, float64 (n,)."""
-    function = plain_function(rule)
+def _results(rule: Rule, drawn: list[dict[str, Any]]) -> np.ndarray:
+    """Return the results of a rule in a kernel for sets of all arguments, float64 (n,)."""
+    lengths = [read.length for read in rule.inputs.values()] + [0] * len(rule.parameters)
+    function, names = plain_function(rule), (*rule.inputs, *rule.parameters)
+    rows = np.array([np.hstack([*(values[name] for name in names), 0.0]) for values in drawn])
     results = np.zeros(len(rows))
-    rows_type = ti.types.ndarray(dtype=ti.f64, ndim=2)
-    results_type = ti.types.ndarray(dtype=ti.f64, ndim=1)
+    rows_type, results_type = (ti.types.ndarray(ti.f64, ndim) for ndim in (2, 1))
 
     @while_compiling
     def of_row(inputs: Any, row: Any) -> Any:
         arguments, at = [], 0
         for length in lengths:
-            entries = [_entry(inputs, row, at + k) for k in range(max(1, length))]
+            entries = [subscript(None, inputs, row, at + k) for k in range(max(1, length))]
             arguments.append(ti.Vector(entries) if length else entries[0])
-            at += max(1, length)
+            at += len(entries)
         return function(*arguments)
 
     @ti.kernel
@@ -147,5 +140,5 @@ def _results(rule: Rule, rows: np.ndarray, lengths: list[int]) -> np.ndarray:
             outputs[row] = of_row(inputs, row)
 
     with runtime.quiet():
-        compute(rows if rows.size else np.zeros((len(rows), 1)), results)
+        compute(rows, results)
     return results

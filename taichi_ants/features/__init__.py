@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from taichi_ants.features.castes import CASTES
+from taichi_ants.features.castes import numbers_of_castes as numbers_of_castes
 from taichi_ants.features.feature import Array, Feature, Task
+from taichi_ants.features.foods import FOODS
 from taichi_ants.features.labour import LABOUR
 from taichi_ants.features.life import AGE
 from taichi_ants.features.noise import MISREAD, SLIP
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 # In the order of their hooks, which is the order of random draws.
-FEATURES: tuple[Feature, ...] = (CASTES, LABOUR, SLIP, MISREAD, AGE)
+FEATURES: tuple[Feature, ...] = (FOODS, CASTES, LABOUR, SLIP, MISREAD, AGE)
 INPUTS = {name: read for feature in FEATURES for name, read in feature.inputs.items()}
 
 
@@ -51,8 +53,3 @@ def arrays(per: str) -> Iterator[tuple[Feature, Array]]:
         for array in feature.arrays:
             if array.per == per:
                 yield feature, array
-
-
-def numbers_of_castes(features: tuple[Feature, ...]) -> dict[str, Any]:
-    """Return the numbers of castes that features declare, by name, in order."""
-    return {name: of for feature in features for name, of in feature.of_castes.items()}

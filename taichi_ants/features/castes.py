@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, count
 from taichi_ants.features.feature import ANT, CASTE, Array, Feature, State, Task
 from taichi_ants.features.labour import Threshold
 from taichi_ants.features.life import Ticks
@@ -80,12 +80,10 @@ class Caste(Settings, path="task.castes.NAME"):
         None
     )
     lays: Annotated[str, Setting("pheromones to lay: all, none, or names with commas")] = ALL
-    outbound_cue: Annotated[
-        str | None, Setting("pheromone that ants without food see as T; off: that of the task")
-    ] = None
-    homing_cue: Annotated[
-        str | None, Setting("what ants with food see as S; off: the cue of the task")
-    ] = None
+    outbound_cue: Annotated[str | None, Setting("pheromone seen as T; off: that of the task")] = (
+        None
+    )
+    homing_cue: Annotated[str | None, Setting("cue seen as S; off: that of the task")] = None
     lifespan: Annotated[Ticks, Setting("age at which an ant dies; off: that of the task")] = None
     threshold: Annotated[Threshold, Setting("response thresholds of the ants")] = Threshold()
 
@@ -182,19 +180,77 @@ def _columns(state: State) -> dict[str, np.ndarray]:
     return {"caste": castes}
 
 
+def numbers_of_castes(features: tuple[Feature, ...]) -> dict[str, Any]:
+    """Return the numbers of castes that features declare, by name, in order."""
+    return {name: of for feature in features for name, of in feature.of_castes.items()}
+
+
 def _constants(state: State) -> dict[str, np.ndarray]:
-    """Return the probabilities of the castes of newborn ants, and scratch counts of deliveries."""
+    """Return the numbers and update weights of castes, chances of newborn ants, and scratch."""
     import numpy as np
 
-    nests, chances = state.nests_at_start, []
+    nests, chances, castes = state.nests_at_start, [], state.task.castes.values()
     for w, nest in np.ndindex(len(nests), state.n_nests):
         n = int(np.count_nonzero(nests[w] == nest))
         chances.append(np.cumsum(chances_in(state.task.castes, nest, n)))
+    rows = numbers_of_castes(state.model.features).values()
+    weights = [state.update_weights(caste.learning_rate or 0.0) for caste in castes]
+    longest = max(map(len, weights))
     return {
+        # By number and caste, f64.
+        "castes": np.array([[of(state.task, caste) for caste in castes] for of in rows], float),
+        # By caste and n, see `update_weights`; unused without an own learning rate.
+        "caste_weights": np.stack(
+            [np.pad(one, (0, longest - len(one)), mode="edge") for one in weights]
+        ),
         # By world, nest and caste: cumulative.
         "caste_chances": np.concatenate(chances),
         "delivered_by_caste": np.zeros(len(nests) * state.chunks * MAX_CASTES, np.int32),
     }
+
+
+def update_weights_of(state: State, castes: np.ndarray, ants: np.ndarray) -> np.ndarray:
+    """Return the weight of the mean error of several ants of a caste in an update.
+
+    Arrays (n,), int and float64. Castes that do not learn have the weight 0.
+    """
+    import numpy as np
+
+    weights = state.arrays["weights"]
+    weights = weights[np.minimum(ants, len(weights) - 1)]
+    if not state.task.castes:
+        return weights
+    own, numbers = state.arrays["caste_weights"], state.arrays["castes"][:, castes]
+    numbers = dict(zip(CASTES.of_castes, numbers, strict=False))
+    of_castes = own[castes, np.minimum(ants, own.shape[1] - 1)]
+    weights = np.where(numbers["learning_rate"] >= 0, of_castes, weights)
+    return np.where(numbers["learns"] == 1, weights, 0.0)
+
+
+def _refusals(state: State) -> Iterator[str]:
+    for name, caste in state.task.castes.items():
+        if caste.nest is not None and caste.nest >= state.n_nests:
+            yield (
+                f"`task.castes.{name}.nest` is {caste.nest}, but the world has "
+                f"{count(state.n_nests, 'nest')}, numbered from 0; choose one of them."
+            )
+        if caste.policy is not None and state.sharing == "independent":
+            yield (
+                f"`task.castes.{name}.policy` is {caste.policy!r}, but sharing is "
+                '"independent", so each ant learns into its own table; set sharing to "shared" or '
+                '"frozen".'
+            )
+
+
+def _newborn(state: State, w: int, nests: np.ndarray, draw: Callable[[int], np.ndarray]) -> Any:
+    """Return the castes of newborn ants of some nests (n,), each by a draw."""
+    import numpy as np
+
+    if len(state.task.castes) == 1:
+        return {}
+    drawn = (draw(len(nests)) >> np.uint64(32)) / 2.0**32
+    bounds = state.part("caste_chances", w).reshape(state.n_nests, -1)[nests, :-1]
+    return {"caste": np.count_nonzero(bounds <= drawn[:, None], axis=1)}
 
 
 def _lays(task: Task, caste: Caste) -> int:
@@ -235,4 +291,6 @@ CASTES = Feature(
     ),
     columns=_columns,
     constants=_constants,
+    refusals=_refusals,
+    newborn=_newborn,
 )

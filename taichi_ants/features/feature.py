@@ -28,26 +28,31 @@ State = Any  # a `ColonyState`
 
 
 class Array(NamedTuple):
-    """An array of a colony by ant, or by world and nest or caste, 0 at the start of an episode.
+    """An array of a colony by ant, or by world and nest or caste.
 
     Attributes:
         name: Its name in hooks; that of the array in kernels, and in files.
         per: ANT, NEST or CASTE.
         dtype: The type in kernels; "i1", "i4" or "f4" per ant.
-        view: Its name as an attribute of a colony, and of a snapshot with "ant_" in front.
-        shown_as: The type there.
+        view: Its name as an attribute of a colony; of a feature, also that of a snapshot, with
+            "ant_" in front. "" if it has none.
+        shown_as: The type of the attribute, which is a copy; "" for a writable view.
         words, values, unit: The name, the values and the unit in the description of a model, which
             leaves out arrays without a name.
+        start: The value at the start of an episode, and where no ant is.
+        instead: The array that the attribute shows if a colony does not need this one; "" for 0.
     """
 
     name: str
     per: str
     dtype: str
-    view: str
-    shown_as: str
+    view: str = ""
+    shown_as: str = ""
     words: str = ""
     values: str = "at least 0"
     unit: str = ""
+    start: int = 0
+    instead: str = ""
 
 
 class Mark(NamedTuple):
@@ -103,6 +108,9 @@ class Feature:
         columns: A function of a colony that returns the arrays (W, ants) of ants that start, where
             these are not 0.
         constants: A function of a colony that returns further arrays of its kernels.
+        refusals: A function of a colony that yields why it cannot be, as sentences.
+        newborn: A function of a colony, a world, the nests (n,) of ants that an intervention adds,
+            and a function that draws n words. It returns their arrays (n,) where these are not 0.
         faults: A function of a task that yields what is wrong with it, as sentences.
         example: Settings of a task that uses the feature.
         measures: Its measures by name: a function of a `Snapshot`, the unit, and words.
@@ -122,6 +130,8 @@ class Feature:
     fixed: Callable[[Caste], Any] = lambda caste: None
     columns: Callable[[State], Mapping[str, Any]] = lambda state: {}
     constants: Callable[[State], Mapping[str, Any]] = lambda state: {}
+    refusals: Callable[[State], Iterator[str]] = lambda state: iter(())
+    newborn: Callable[..., Mapping[str, Any]] = lambda state, w, nests, draw: {}
     faults: Callable[[Task], Iterator[str]] = lambda task: iter(())
     example: Mapping[str, Any] = field(default_factory=dict)
     measures: Mapping[str, tuple[Function, str, str]] = field(default_factory=dict)

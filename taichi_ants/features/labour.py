@@ -58,14 +58,10 @@ class Labour(Settings, path="task.labour"):
 
     rule: Annotated[LabourRule, Setting("rule by which ants start and stop foraging")] = "none"
     demand: Annotated[
-        Stimulus,
-        Setting("rise of the stimulus of each nest", unit="units of stimulus per tick", usual=1.0),
-        _DIVIDES,
+        Stimulus, Setting("rise of the stimulus per tick", unit=_UNIT, usual=1.0), _DIVIDES
     ] = None
     relief: Annotated[
-        Stimulus,
-        Setting("fall of the stimulus with each delivery", unit=_UNIT, usual=10.0),
-        _DIVIDES,
+        Stimulus, Setting("fall of the stimulus per delivery", unit=_UNIT, usual=10.0), _DIVIDES
     ] = None
     exponent: Annotated[
         float | None, Setting("exponent of the response", least=0, most=20, usual=2.0), _DIVIDES

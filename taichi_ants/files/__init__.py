@@ -76,13 +76,21 @@ def check_writable_file(path: PathLike) -> Path:
     """
     with writing(path):
         target = _target_of(path)
-        _try_to_write(next(parent for parent in target.parents if parent.exists()))
+        folder = next(parent for parent in target.parents if parent.exists())
+        # Permission bits do not show a full disk, or bind root.
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(4096))
     return Path(path)
+
+
+def write_bytes(path: PathLike, content: bytes) -> None:
+    """Write the content of a file."""
+    write_atomically(path, lambda file: file.write(content))
 
 
 def write_text(path: PathLike, text: str) -> None:
     """Write text as UTF-8, with its line ends unchanged."""
-    write_atomically(path, lambda file: file.write(text.encode("utf-8")))
+    write_bytes(path, text.encode("utf-8"))
 
 
 def to_json(value: Any, indent: int | None = None) -> str:
@@ -203,15 +211,6 @@ def small(array: np.ndarray) -> np.ndarray:
     return array.astype(np.min_scalar_type(min(low, -1 - high)))
 
 
-def check_writable_folder(path: PathLike) -> Path:
-    """Return the path of a writable folder, which is created if it is missing."""
-    folder = Path(path)
-    with writing(path):
-        folder.mkdir(parents=True, exist_ok=True)
-        _try_to_write(folder)
-    return folder
-
-
 @contextmanager
 def writing(path: PathLike) -> Iterator[None]:
     """Return a context that turns errors of the operating system into an AntsError."""
@@ -235,12 +234,6 @@ def _target_of(path: PathLike) -> Path:
     if str(path).endswith(os.sep) or (target.exists() and not target.is_file()):
         raise AntsError(f"{named(path)} is not a regular file; name a file to write to.")
     return target
-
-
-def _try_to_write(folder: Path) -> None:
-    """Write a temporary file to a folder: permission bits do not show a full disk, or bind root."""
-    with tempfile.TemporaryFile(dir=folder) as file:
-        file.write(bytes(4096))
 
 
 def named(path: PathLike) -> str:

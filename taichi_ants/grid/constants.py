@@ -30,4 +30,6 @@ STREAM_INDIVIDUAL = 11  # number: the ant; for its exploration rate and its inpu
 MAX_STEPS = 10_000_000  # the most ticks of an episode
 MAX_CASTES = 16
 MAX_NESTS = 7  # its number is in three bits of an ant's mark, of which 0 means no ant
+MAX_FOOD_KINDS = 8
+MOST_REWARD = 1000  # the largest absolute reward of an event
 TRAIL = "trail"  # the name of the first pheromone

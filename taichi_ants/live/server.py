@@ -44,9 +44,7 @@ HOST = "127.0.0.1"
 FRAMES_A_SECOND = 30
 FASTEST = 1000.0  # ticks/s; at this speed the session runs as fast as possible
 
-_MOST_PAGES = 24
-_MOST_TEXT = 2**18  # bytes of a request
-_MOST_UPLOAD = 2**22  # bytes of a session file
+_MOST_UPLOAD = 2**22  # bytes of a session file, or another request
 _MOST_IN_FLIGHT = 12  # frames sent to a page before it has drawn the first of them
 _FEW = 4  # with fewer frames per episode, each frame shows another episode
 _PHASES = 24  # number of such frames that together show the course of an episode
@@ -146,7 +144,6 @@ class SessionServer:
         self.playing, self.speed = playing, 12.0
         self._shown = secrets.token_hex(8)  # identifies the session for pages that reconnect
         self.pages: set[Page] = set()  # that are open
-        self._joined = 0  # sockets, including those that have not received a session yet
         self._engine = ThreadPoolExecutor(1, "session")
         self._turns = asyncio.Lock()  # for turns and requests, which use or change the session
         self._over = threading.Event()
@@ -377,8 +374,6 @@ class SessionServer:
 
     def _show(self, frame: bytes) -> None:
         """Send a frame to all pages except those that are behind."""
-        if new_names := self.session.recorder.new_names():
-            self._send(_message("names", names=new_names))
         for page in self.pages:
             page.show(frame)
 
@@ -423,9 +418,7 @@ class SessionServer:
         elif not mine or not (knows or (url.path == "/" and not tokens)):
             response = connection.respond(403, "Open the address that the command printed.\n")
         elif opens:
-            if self._joined < _MOST_PAGES:
-                return None
-            response = connection.respond(503, "Too many pages are open.\n")
+            return None
         elif url.path != "/":
             response = connection.respond(404, "This page does not exist.\n")
         else:
@@ -441,7 +434,6 @@ class SessionServer:
         from websockets.exceptions import ConnectionClosed
 
         page = Page(connection)
-        self._joined += 1
         try:
             async with self._turns:
                 self.pages.add(page)
@@ -460,7 +452,6 @@ class SessionServer:
         except ConnectionClosed:
             pass
         finally:
-            self._joined -= 1
             self.pages.discard(page)
             async with self._turns:  # cancel the files that this page has asked for
                 for kind in [kind for kind, job in self._jobs.items() if job.page is page]:
@@ -473,9 +464,9 @@ def _message(kind: str, /, **facts: Any) -> str:
 
 
 def _read(message: str | bytes) -> Any:
-    """Return the request in a message of a page, None if it is too long or not JSON."""
+    """Return the request in a message of a page, None if it is not JSON."""
     if isinstance(message, bytes):
         return {"do": "load", "content": message}
     with contextlib.suppress(ValueError, RecursionError):
-        return json.loads(message) if len(message) <= _MOST_TEXT else None
+        return json.loads(message)
     return None

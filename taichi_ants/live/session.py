@@ -320,19 +320,18 @@ class Session:
 
     def policy_bytes(self) -> bytes:
         """Return the bytes of a policy file; raise AntsError if ants have several tables."""
-        colony, table = self.colony, self.colony.q_values[0]
-        no_table, learns = not colony.task.choice.needs_table, self.setup.learns
-        if no_table or colony.one_a_slot or (colony.n_nests > 1 and learns):
+        colony, learns = self.colony, self.setup.learns
+        tables = colony.q_values[0].reshape(-1, colony.task.n_states, N_ACTIONS)
+        no_table = not colony.task.choice.needs_table
+        if no_table or (len(tables) > 1 and learns):
             raise AntsError(
                 f"ants have {'no table' if no_table else 'several tables'}, but a policy file "
                 "holds a single one; export the colony instead."
             )
-        if colony.n_nests > 1:
-            table = table[0]  # all nests follow the same policy
         metadata = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
         if learns:
             metadata["training"] = colony.training.as_dict()
-        arguments = (table, metadata, colony.task.observation)
+        arguments = (tables[0], metadata, colony.task.observation)
         return bytes_of("policy.npz", lambda path: save_policy(path, *arguments))
 
     def colony_bytes(self) -> bytes:

@@ -94,7 +94,6 @@ class Live {
     if (["begin", "error", "cancelled"].includes(message.say)) this.stands = false;
     if (message.say === "begin") this.meet(message);
     else if (message.say === "over") this.ended = true; // the socket closes next
-    else if (message.say === "names") Object.assign(this.viewer.history.header.names, message.names);
     else if (message.say === "snapshot" || message.say === "file") this.waiting = message;
     else {
       if (message.say === "state") {

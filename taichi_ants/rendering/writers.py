@@ -86,13 +86,13 @@ def save_animation(
     checked = _checked(frames, round(pause * fps) - 1)
     if is_picture(target):
         *_, last = checked
-        write(target, png(last, optimize=True))
+        files.write_bytes(target, png(last, optimize=True))
     else:
         # The GIF repeats forever; Pillow merges equal frames and stores only changes.
         buffer, images = io.BytesIO(), _with_palette(checked, fps)
         changes = {"optimize": True, "transparency": _UNCHANGED, "disposal": 1}
         next(images).save(buffer, "GIF", save_all=True, append_images=images, loop=0, **changes)
-        write(target, buffer.getvalue())
+        files.write_bytes(target, buffer.getvalue())
 
 
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
@@ -102,12 +102,6 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
         AntsError: The file does not end in .png, or is not writable.
     """
     save_animation(check_file(path, "one picture", ".png"), [frame])
-
-
-def write(target: Path, content: bytes) -> None:
-    """Write a file, and create its folder if it is missing."""
-    files.check_writable_folder(target.parent)
-    files.write_atomically(target, lambda file: file.write(content))
 
 
 def _checked(frames: Iterable[np.ndarray], more: int = 0) -> Iterator[np.ndarray]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -14,6 +13,8 @@ import numpy as np
 
 from taichi_ants.analysis.findings import Finding, Verdict
 from taichi_ants.analysis.tables import number
+from taichi_ants.errors import count
+from taichi_ants.rendering.writers import png
 from taichi_ants.report.odd import in_words
 from taichi_ants.viewer.page import Recording, content_policy, part
 
@@ -69,17 +70,8 @@ class Picture(NamedTuple):
 
     @property
     def data(self) -> str:
-        """A PNG with 64 colours as base64."""
-        from PIL import Image
-
-        file = io.BytesIO()
-        Image.fromarray(self.image).quantize(64).save(file, "png")
-        return base64.b64encode(file.getvalue()).decode()
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height in pixels."""
-        return self.image.shape[1], self.image.shape[0]
+        """A PNG as base64."""
+        return base64.b64encode(png(self.image, optimize=True)).decode()
 
 
 class Shown(NamedTuple):
@@ -171,13 +163,12 @@ def made_facts(made: Mapping[str, Any]) -> dict[str, str]:
     shown = [item for item in made["packages"].items() if item[0] in _SHOWN_PACKAGES]
     packages = ", ".join(f"{name} {version}" for name, version in shown)
     changed = ", with changes that are not committed" if made.get("clean") is False else ""
-    cpus = f"{made['cpus']} processors" if made["cpus"] != 1 else "one processor"
     facts = {
         "Command": made["command"],
         "Finished": made["finished"].replace("T", " ").replace("+00:00", " UTC"),
         "Commit": made["commit"] and made["commit"] + changed,
         "Versions": f"Python {made['python']}, {packages}",
-        "Machine": f"{made['platform']}, {cpus}",
+        "Machine": f"{made['platform']}, {count(made['cpus'], 'processor')}",
         "Time": f"{made['seconds']:.0f} seconds",
     }
     return {name: words for name, words in facts.items() if words}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from taichi_ants.features import INPUTS
 from taichi_ants.features.feature import Input
+from taichi_ants.grid.constants import MOST_REWARD
 
 if TYPE_CHECKING:
     import numpy as np
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
 AHEAD = 3  # entries of an input with a value for each cell ahead: left, forward, right
 LEVELS, LEVEL = "levels_", "level_"  # the beginnings of inputs that read a field
 MOST_LEVEL = 1_000_000_000
-MOST_REWARD = 1000
 
 
 class RuleKind(NamedTuple):

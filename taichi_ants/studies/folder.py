@@ -27,7 +27,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib import metadata
-from operator import methodcaller
 from pathlib import Path
 from typing import Any
 
@@ -126,7 +125,7 @@ def ask(folder: Path, asked: Mapping[str, Any], inputs: Mapping[str, bytes], for
     if before and not force:
         _check_grows(folder, before, asked)
     for name, content in inputs.items():
-        files.write_atomically(folder / name, methodcaller("write", content))
+        files.write_bytes(folder / name, content)
     write_json(folder / STUDY, asked)
 
 

@@ -13,8 +13,8 @@ from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.engines.runs.training import rollout
 from taichi_ants.errors import AntsError, checked_whole, count
 from taichi_ants.studies.command import opened
-from taichi_ants.studies.points import ColonyPoint, key_of
-from taichi_ants.studies.store import Store
+from taichi_ants.studies.points import Point, RunPoint, key_of
+from taichi_ants.studies.store import Arrays, Store
 from taichi_ants.studies.study import Q_VALUES, outcome_of
 from taichi_ants.viewer import Recorder, Recording, record_trace, save_page
 
@@ -22,10 +22,8 @@ from taichi_ants.viewer import Recorder, Recording, record_trace, save_page
 def play(folder: Path, number: int, threads: int | None) -> None:
     """Compute row `number`, from 1, of a table of runs again, and write a page that plays it.
 
-    The page plays the first episode of the evaluation.
-
-    Raises:
-        AntsError: The folder has no such row, or the new numbers differ from those in the store.
+    Raises an AntsError if the folder has no such row, or the new numbers differ from those in the
+    store.
     """
     with opened(folder) as planned:
         study, store = planned.study, Store(folder)
@@ -33,7 +31,6 @@ def play(folder: Path, number: int, threads: int | None) -> None:
         checked_whole("row", number, 1, len(order) * len(study.seeds))
         row, s = divmod(number - 1, len(study.seeds))
         point, seed = study.points[order[row]], study.seeds[s]
-        title = f"Row {number} of {folder.name}"
         where: dict[str, Any] = {"threads": threads, "arch": planned.asked["arch"]}
         try:
             kept = store.read([study.keys[order[row]]], [seed], study.arrays)
@@ -56,16 +53,8 @@ def play(folder: Path, number: int, threads: int | None) -> None:
                 f"{count(len(differ), 'array')} of this run, such as {differ[0]}, differ from "
                 "those in the store; use the version that computed it."
             )
-        if isinstance(point, ColonyPoint):
-            tables = again.get(Q_VALUES, [None])[0]
-            if tables is None:
-                tables = point.tables([seed], learned, lambda share: None, where)
-            colony = point.colony(point.worlds([seed]), [seed], tables, False, **where)
-            recording = _recorded(colony, point, title)
-        else:
-            table = point.policy.q_values if point.policy else again[Q_VALUES][0, 0]
-            trace = rollout(point.world, table, seed, 0, point.max_steps, point.task)
-            recording = record_trace(trace, title)
+        title = f"Row {number} of {folder.name}"
+        recording = _recorded(point, seed, again, learned, title, where)
     path = folder / f"row-{number}.html"
     save_page(path, recording)
     print(f"seed {seed}")
@@ -75,8 +64,18 @@ def play(folder: Path, number: int, threads: int | None) -> None:
     print(f"The new numbers are those of the row. Open {path} to see its first episode.")
 
 
-def _recorded(colony: Colony, point: ColonyPoint, title: str) -> Recording:
-    """Return a recording of an episode of a colony, with the protocol of its evaluation."""
+def _recorded(
+    point: Point, seed: int, again: Arrays, learned: Any, title: str, where: dict[str, Any]
+) -> Recording:
+    """Return a recording of the first episode of the evaluation of a run with these arrays."""
+    if isinstance(point, RunPoint):
+        table = point.policy.q_values if point.policy else again[Q_VALUES][0, 0]
+        trace = rollout(point.world, table, seed, 0, point.max_steps, point.task)
+        return record_trace(trace, title)
+    tables = again.get(Q_VALUES, [None])[0]
+    if tables is None:
+        tables = point.tables([seed], learned, lambda share: None, where)
+    colony = point.colony(point.worlds([seed]), [seed], tables, False, **where)
     colony.begin_episode(point.ticks)
     recorder = Recorder(colony, title)
     frames = [recorder.snapshot()]

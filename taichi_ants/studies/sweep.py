@@ -205,7 +205,7 @@ def tables(sweep: Sweep, results: Results) -> str:
         report = f"{report}\n{design.report(indices, seeds)}"
         files.write_csv(folder / "sensitivity.csv", indices, COLUMNS)
     if results.figures:
-        _draw(sweep, first, values[first], files.check_writable_folder(folder / "figures"))
+        _draw(sweep, first, values[first], folder / "figures")
     return report
 
 

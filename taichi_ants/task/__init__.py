@@ -1,6 +1,7 @@
 """The rules: observations, actions, pheromone and rewards of ants."""
 
 from taichi_ants.features.castes import Caste
+from taichi_ants.features.foods import Food
 from taichi_ants.features.labour import Labour, Threshold
 from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
@@ -8,7 +9,7 @@ from taichi_ants.task.choice import Choice
 from taichi_ants.task.field import Field
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
-from taichi_ants.task.rewards import Food, Rewards
+from taichi_ants.task.rewards import Rewards
 from taichi_ants.task.task import Task, Traffic, fetching, foraging, paper, queueing
 
 __all__ = [

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from taichi_ants.grid.constants import MAX_CASTES as MAX_CASTES
+from taichi_ants.grid.constants import MAX_FOOD_KINDS as MAX_FOOD_KINDS
 from taichi_ants.grid.constants import MAX_NESTS as MAX_NESTS
 from taichi_ants.grid.constants import MAX_STEPS as MAX_STEPS
+from taichi_ants.grid.constants import MOST_REWARD as MOST_REWARD
 
 # Codes of the cells in view (two bits each in a state index).
 SEES_EMPTY = 0  # E
@@ -19,8 +21,6 @@ OBSTACLE = SEES_OBSTACLE | SEES_OBSTACLE << 2
 FOOD = SEES_GOAL | SEES_OBSTACLE << 2
 QUEEN = SEES_OBSTACLE | SEES_GOAL << 2
 
-MAX_FOOD_KINDS = 8
-
 # Actions. The first three are moves, relative to the heading.
 LEFT, FORWARD, RIGHT, PICK_UP, GIVE = 0, 1, 2, 3, 4
 ACTION_NAMES: tuple[str, ...] = ("left", "forward", "right", "pick up", "give")
@@ -33,9 +33,6 @@ BEST_AT = N_ACTIONS
 
 # State = (carries, left, forward, right); index = 64 * carries + 16 * left + 4 * forward + right.
 N_STATES = 128
-
-# The largest absolute reward of an event.
-MOST_REWARD = 1000
 
 # The trail level that a carrier sets.
 DEPOSIT_LEVEL = 250

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from taichi_ants.rules.rule import BUILT_IN, Rule, registered, words
 from taichi_ants.settings import Setting, Settings, Share
@@ -13,7 +13,6 @@ from taichi_ants.task.constants import DEPOSIT_LEVEL
 if TYPE_CHECKING:
     import numpy as np
 
-Own = TypeVar("Own", bound="Pheromone")
 View = Literal["half", "strongest", "strongest_under_carriers"]
 DEPOSITS = BUILT_IN["deposit"]
 MAX_DEPOSIT = 1_000_000
@@ -83,8 +82,7 @@ class Pheromone(Settings, path="task.pheromone"):
     ] = None
     slope: Annotated[
         Level,
-        Setting("decrease of an ant's deposits per tick since its load changed", usual=10),
-        Setting(only=("deposit", "fading")),
+        Setting("decrease per tick since the load changed", usual=10, only=("deposit", "fading")),
     ] = None
     view: Annotated[
         View,
@@ -120,7 +118,7 @@ class Pheromone(Settings, path="task.pheromone"):
         return -(-int(self.level) // self.slope) if self.slope else 0
 
     @property
-    def lasting(self: Own) -> Own:
+    def lasting(self) -> Pheromone:
         """This pheromone without evaporation."""
         return self.replace(evaporation="none")
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from taichi_ants.errors import shown
 from taichi_ants.features import FEATURES, probabilities, used_by
 from taichi_ants.features.castes import ALL, NOTHING, Caste, parts_in
+from taichi_ants.features.foods import Food
 from taichi_ants.features.labour import Labour
 from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
@@ -22,7 +23,7 @@ from taichi_ants.task.choice import Choice
 from taichi_ants.task.field import COMPASS, TRAIL, Field
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
-from taichi_ants.task.rewards import Food, Rewards
+from taichi_ants.task.rewards import Rewards
 
 Delivery = Literal["terminates", "truncates"]
 # Settings of castes that need a table of action values, or certain rules of choice.
@@ -56,9 +57,7 @@ class Traffic(Settings, path="task.traffic"):
     }
 
     swap: Annotated[bool, Setting("let ants with food change places with ants without")] = False
-    follow: Annotated[bool, Setting("let ants enter cells that ants leave in the same tick")] = (
-        False
-    )
+    follow: Annotated[bool, Setting("let ants enter cells that ants leave in the tick")] = False
     carriers_first: Annotated[
         bool, Setting("let carriers win cells that foragers want too; requires swap or follow")
     ] = False
@@ -162,7 +161,7 @@ class Task(Settings, path="task"):
         object.__setattr__(self, "rules", Named({**used, **others}))
 
     def _faults(self) -> Iterator[str]:
-        choice, life = self.choice, self.life
+        choice = self.choice
         without_states = choice.rule == "deneubourg" or (choice.own_rule and self.noise.misread)
         if without_states and self.observation != "paper":
             yield (
@@ -189,16 +188,6 @@ class Task(Settings, path="task"):
                     f"{what} is {shown(field_name)}; it must be one of {', '.join(known)}, or the "
                     "name of a field that you add to `task.fields`."
                 )
-        if self.foods and life.regrowth is not None:
-            yield (
-                f"`task.life.regrowth` is {life.regrowth}; with `task.foods`, set the regrowth of "
-                "each kind instead."
-            )
-        if life.pile_move_interval and (len(self.foods) > 1 or self.has_loads):
-            yield (
-                f"`task.life.pile_move_interval` is {life.pile_move_interval}; only food of one "
-                "kind with one load in a cell can wander, so leave it out."
-            )
         for feature in FEATURES:
             yield from feature.faults(self)
         nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}

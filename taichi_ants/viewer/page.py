@@ -15,7 +15,7 @@ from typing import Any
 
 from taichi_ants import files
 from taichi_ants.errors import expect
-from taichi_ants.rendering.writers import check_file, write
+from taichi_ants.rendering.writers import check_file
 
 # The parts of the script, in this order: each part uses only those before it.
 SCRIPTS = ("history.js", "stage.js", "panel.js", "timeline.js", "viewer.js")
@@ -123,4 +123,4 @@ def save_page(path: files.PathLike, recording: Recording) -> None:
     Raises:
         AntsError: The file does not end in .html, or is not writable.
     """
-    write(check_page(path), page(recording).encode())
+    files.write_bytes(check_page(path), page(recording).encode())

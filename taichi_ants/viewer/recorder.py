@@ -16,6 +16,7 @@ from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.results import Trace
 from taichi_ants.errors import AntsError, count, expect
 from taichi_ants.features import used_by
+from taichi_ants.features.castes import update_weights_of
 from taichi_ants.features.feature import Feature, Mark
 from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
@@ -25,7 +26,7 @@ from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.viewer.frames import pack, types_of
 from taichi_ants.viewer.page import Recording
 
-_MOST_NAMES = 4096  # states up to which a header names all states, seen or not
+_MOST_NAMES = 1 << 13  # states up to which a header names all states, seen or not
 _RESTS = 15  # the action of an ant that rests in frames
 _MOST = 2000  # points of curves
 
@@ -51,8 +52,6 @@ class Recorder:
         self.types = types_of(self.grid.size, self._n_states, *dense)
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables that were sent
         self._owners = np.full(owners, -1) if colony.one_a_slot else np.arange(owners)
-        few = self._n_states <= _MOST_NAMES
-        self._named = set(range(self._n_states)) if few else set()  # states with names on pages
         # For curves: the first episode, the ticks until the last end that was noted, its episode.
         self._first, self._before, self._ended = colony.episode, 0, -1
         self._every, self._seen = 1, 0  # one of `_every` points is kept
@@ -105,6 +104,8 @@ class Recorder:
         is_own = task.choice.own_rule or not task.sees.encode.__module__.startswith("taichi_ants.")
         by_letters = colony.has_training and not is_own and not task.noise.misread
         names = (TRAIL, *task.fields, COMPASS)  # the number of the compass is -1
+        few, seen = self._n_states <= _MOST_NAMES, np.flatnonzero(self._known) % self._n_states
+        named = range(self._n_states) if few else np.unique(seen).tolist()
         return {
             "format": 6,
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
@@ -121,7 +122,7 @@ class Recorder:
             ],
             "nests": colony.n_nests,
             "n_states": self._n_states,
-            "names": self._names(self._named | self._seen_states()),
+            "names": {state: name_parts(task.sees, state) for state in named},
             "view": list(task.sees.cells),
             "letters": task.sees.letters,
             "actions": ACTION_NAMES,
@@ -146,23 +147,6 @@ class Recorder:
             "follow": self._follow,
             "about": self._about(),
         }
-
-    def new_names(self) -> dict[int, tuple[str, str, list[str]]]:
-        """Return the `name_parts` of states that ants have visited since the last call.
-
-        Returns none if there are few states, because the header has the names of all.
-        """
-        new = self._seen_states() - self._named
-        self._named |= new
-        return self._names(new)
-
-    def _seen_states(self) -> set[int]:
-        """Return the states that ants have visited, if the header does not have all names."""
-        few = len(self._named) == self._n_states
-        return set() if few else {*(np.flatnonzero(self._known) % self._n_states).tolist()}
-
-    def _names(self, states: set[int]) -> dict[int, tuple[str, str, list[str]]]:
-        return {state: name_parts(self.colony.task.sees, state) for state in sorted(states)}
 
     def _about(self) -> list[tuple[str, str]]:
         colony, config = self.colony, self.colony.training
@@ -261,7 +245,7 @@ class Recorder:
         moved = self._tables().astype(np.float64).ravel()[pairs] - before.ravel()[pairs]
         _, pair, ants = np.unique(pairs, return_inverse=True, return_counts=True)
         castes = self.colony.castes[0, slots]
-        weights = self.colony.update_weights_of(castes, ants[pair])
+        weights = update_weights_of(self.colony, castes, ants[pair])
         values = np.full(len(moved), np.nan)
         errors[acted] = np.divide(moved, weights, out=values, where=weights > 0)
         return errors
@@ -292,12 +276,12 @@ class Recorder:
         rates = (colony.epsilon, colony.learning_rate)
         delivered = colony.delivered[0] + totals[0]
         counts = (len(numbers), delivered, self.ticks)
-        stored = [colony.stored_trail(0, name) for name in (TRAIL, *colony.task.fields)]
+        stored = [colony.stored_pheromone(0, n) for n in range(len(colony.pheromones))]
         clocks = [clock for _, clock in stored]
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, *clocks)
         sections["progress"], self._new = self._new, []
         layers = {"ground": snapshot.ground, "kinds": snapshot.food_kinds}
-        layers |= {f"trail{number or ''}": layer for number, (layer, _) in enumerate(stored)}
+        layers |= {f"trail{number or ''}": layer.copy() for number, (layer, _) in enumerate(stored)}
         for name, layer in layers.items():
             cells = np.flatnonzero(self._sent.get(name, 0) != layer)
             sections |= {f"{name}_at": cells, name: layer[cells]}

@@ -216,7 +216,7 @@ def test_shares_of_crossings_by_hand(script):
 
 
 def test_chosen_branches_by_hand(script):
-    """A colony chooses if 80 % of its crossings are on one branch; without any, it does not count."""
+    """A colony chooses with 80 % of its crossings on one branch; without any, it is left out."""
     given = np.array([0.75, 0.125, np.nan, 0.5])
     found = script("models/double_bridge", shares=lambda *_: given, BRIDGES={"equal": (20, 0)})
     rows, summary, *_ = found["measure"]([0, 1, 2, 3])
@@ -505,7 +505,7 @@ def test_names_of_equal_branches_do_not_matter():
     [(1, 2, 4, 3), (5, 0, 4, -0.6), (2, 0, 4, 0), (0, -1, 0, -0.2), (-3, -1, 0, 2)],
 )
 def test_td_errors_of_hysteretic_q_learning_by_hand(script, value, reward, largest, error):
-    td_error = script("plugins/hysteretic")["td_error"].__wrapped__
+    td_error = script("plugins/hysteretic")["td_error"]
     next_values = np.array([-9.0, largest, -9.0, -9.0, -9.0])
     assert td_error(value, reward, 0.5, next_values, 0, 0.3) == pytest.approx(error)
 

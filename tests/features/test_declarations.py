@@ -82,6 +82,7 @@ def identifiers(path: Path) -> set[str]:
 # The names of a feature that others may not use; what the engine does with castes, and the phases
 # of births and food, are algorithms with static tests.
 OWN = {
+    "castes": {"chances_in", "numbers_in", "pheromones_laid"},
     "labour": {
         *("Threshold", "idle", "thresholds", "stimulus", "stimuli", "ant_idle", "ant_thresholds"),
         *("stop_probability", "demand", "relief"),

@@ -210,7 +210,6 @@ def test_a_page_that_joins_late_sees_what_the_others_see(name):
     for step in range(90):
         if step == 45:
             late = [session.recorder.whole()]
-            header["names"] |= session.recorder.new_names()
         frame = session.advance()
         if step % 3 == 0:
             first.append(frame)

@@ -85,8 +85,8 @@ def test_pick_draws_by_weights_and_never_what_is_closed(clean):
         assert pick(weights, random) == index, (weights, random)
     runtime.start()
     rules.register("choice")(picks)
-    rows = np.array([[*weights, random] for weights, random, _ in PICKS], np.float64)
-    in_kernels = own_rules_of_kernels._results(rules.get("picks"), rows, [3, 0]) - 1
+    inputs = [{"levels": weights, "random": random} for weights, random, _ in PICKS]
+    in_kernels = own_rules_of_kernels._results(rules.get("picks"), inputs) - 1
     assert in_kernels.tolist() == [index for *_, index in PICKS]
     rng = np.random.default_rng(0)
     drawn = np.bincount([pick((1, 0, 3), one) for one in rng.random(10_000)], minlength=3)

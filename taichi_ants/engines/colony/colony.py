@@ -9,7 +9,6 @@ import numpy as np
 
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import WorldRow
-from taichi_ants.engines.colony.state import checked_worlds
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, checked_whole, entries_of, shown
@@ -88,8 +87,8 @@ class Colony(TickingColony):
                 "episodes."
             )
         for place in places if worlds is not None else ():
-            of_seeds = checked_worlds(place, len(self.seeds), self.learns)
-            for world, seed in dict.fromkeys(zip(of_seeds, self.seeds, strict=True)):
+            pairs = zip(self.checked_worlds(place), self.seeds, strict=True)
+            for world, seed in dict.fromkeys(pairs):
                 world.start(seed, self.ants, self.start)  # raises an error if there is no room
         recorder, timetable = Recorder(measures, every), Timetable(self, protocol, ticks)
         outcomes = []
@@ -98,7 +97,7 @@ class Colony(TickingColony):
             recorder.begin(episode)
             with timetable:
                 for stop in stops(ticks, recorder.every):
-                    for _ in timetable.pieces(self._stepper.pieces, stop - self.ticks):
+                    for _ in timetable.pieces(TickingColony.pieces, stop - self.ticks):
                         if progress is not None:
                             progress((episode + self.ticks / ticks) / episodes)
                         if not self.running.any():

@@ -10,13 +10,15 @@ from taichi_ants.engines.colony.layout import FoodSourceRow, WorldRow
 from taichi_ants.task.constants import FOOD
 from taichi_ants.worlds.world import World
 
+_GIVEN = [FoodSourceRow.CELL, FoodSourceRow.TAKEN, FoodSourceRow.PILE, FoodSourceRow.KIND]
+
 
 def arrays(
     sources: Iterable[np.ndarray], rows: np.ndarray, room: int, size: int
 ) -> dict[str, np.ndarray]:
     """Return the arrays of food sources and piles of all worlds, with `room` sources in each.
 
-    `sources` has for each world the rows CELL, TAKEN, PILE and KIND of `FoodSourceRow`, (4, n).
+    `sources` has for each world the rows `_GIVEN` of `FoodSourceRow`, (4, n).
     Write the numbers of sources and piles into `rows`, (WorldRow, W). A world has `size` cells.
     """
     n_worlds = rows.shape[1]
@@ -24,15 +26,12 @@ def arrays(
     begins = np.zeros((n_worlds, room + 1), np.int32)
     food_sources[FoodSourceRow.TAKEN] = -1
     source_of = np.full(n_worlds * size if room else 1, -1, np.int32)
-    for w, (cells, taken, piles, kinds) in enumerate(sources):
+    for w, given in enumerate(sources):
+        cells, taken, piles, _ = given
         n_piles = int(piles.max(initial=-1)) + 1
         of_world = food_sources[:, w * room : w * room + len(cells)]
-        of_world[FoodSourceRow.CELL], of_world[FoodSourceRow.TAKEN] = cells, taken
-        of_world[FoodSourceRow.KIND] = kinds
-        of_world[FoodSourceRow.PILE], of_world[FoodSourceRow.LISTED] = (
-            piles,
-            np.argsort(piles, kind="stable"),
-        )
+        of_world[_GIVEN] = given
+        of_world[FoodSourceRow.LISTED] = np.argsort(piles, kind="stable")
         begins[w, 1 : n_piles + 1] = np.cumsum(np.bincount(piles, minlength=n_piles))
         rows[WorldRow.FOOD_SOURCES, w], rows[WorldRow.PILES, w] = len(cells), n_piles
         (full,) = np.nonzero(taken < 0)
@@ -70,8 +69,7 @@ def at_start(world: World) -> np.ndarray:
 def of_world(arrays: Mapping[str, np.ndarray], w: int, room: int) -> np.ndarray:
     """Return the present food sources of a world as `arrays` takes them, int (4, n)."""
     n = arrays["worlds"][WorldRow.FOOD_SOURCES, w]
-    rows = [FoodSourceRow.CELL, FoodSourceRow.TAKEN, FoodSourceRow.PILE, FoodSourceRow.KIND]
-    return arrays["food_sources"][rows, w * room : w * room + n]
+    return arrays["food_sources"][_GIVEN, w * room : w * room + n]
 
 
 def changed(
@@ -82,25 +80,20 @@ def changed(
     A waiting source of a cell gets its food back. A new source joins the pile of the first adjacent
     source, or forms a new pile. The source of the food takes its kind. `offsets` are the grid's.
     """
-    if what != FOOD:
-        sources = sources[:, ~np.isin(sources[0], cells)]
-    at, taken, pile, kinds = sources.tolist()
+    gone = () if what == FOOD else cells
+    rows = sources[:, ~np.isin(sources[0], gone)].T.tolist()  # cell, taken, pile, kind
     on: dict[int, list[int]] = {}
-    for source, cell in enumerate(at):
+    for source, (cell, *_) in enumerate(rows):
         on.setdefault(cell, []).append(source)
     for cell in cells.tolist() if what == FOOD else ():
         here = on.setdefault(cell, [])
         if not here:
-            around = [on.get(cell + step, ()) for step in offsets.tolist()]
-            first = min((source for there in around for source in there), default=None)
-            here.append(len(at))
-            at.append(cell)
-            taken.append(0)
-            kinds.append(kind)
-            pile.append(max(pile, default=-1) + 1 if first is None else pile[first])
-        if all(taken[source] >= 0 for source in here):
-            taken[here[0]] = -1
-        (full,) = [source for source in here if taken[source] < 0]
-        kinds[full] = kind
-    _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without removed piles
-    return np.array([at, taken, pile, kinds], int).reshape(4, -1)
+            around = [source for step in offsets.tolist() for source in on.get(cell + step, ())]
+            new_pile = max((pile for _, _, pile, _ in rows), default=-1) + 1
+            here.append(len(rows))
+            rows.append([cell, 0, rows[min(around)][2] if around else new_pile, kind])
+        (full,) = [source for source in here if rows[source][1] < 0] or here[:1]
+        rows[full][1], rows[full][3] = -1, kind
+    now = np.array(rows, int).reshape(-1, 4).T
+    _, now[2] = np.unique(now[2], return_inverse=True)  # without removed piles
+    return now

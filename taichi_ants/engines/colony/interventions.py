@@ -27,7 +27,7 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
-from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, NestRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.errors import AntsError, as_array, count
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_INTERVENTION
@@ -63,6 +63,7 @@ class _World:
     def __init__(self, interventions: Interventions, w: int) -> None:
         self.all, self.w, self.colony = interventions, w, interventions.colony
         self.rows = self.colony.arrays["worlds"][:, w]
+        self.queen_cells = self.colony.queen_cells[w]  # a view, (nests,)
 
     def place(self, change: language.Place) -> Change:
         cells, foods = self._index(change.cells), list(self.colony.task.foods)
@@ -180,12 +181,6 @@ class _World:
         """Return a view of the world's part of an array."""
         return self.colony.part(name, self.w)
 
-    @property
-    def queen_cells(self) -> np.ndarray:
-        """A view of the cell of each nest's queen, (nests,)."""
-        n = self.colony.n_nests
-        return self.colony.arrays["nests"][NestRow.QUEEN_CELL, self.w * n : (self.w + 1) * n]
-
     def _living_slots(self, nest: int | None = None) -> np.ndarray:
         """Return the slots of the living ants, or those of a nest, in the order of numbers."""
         living = self.colony.living[self.w]
@@ -254,7 +249,8 @@ class _World:
             sources = [food_sources.of_world(arrays, w, room) for w in range(len(colony.worlds))]
             now = food_sources.changed(sources[self.w], cells, what, number, grid.offsets)
             sources[self.w] = now
-            colony.make_food_sources_fit(now.shape[1])
+            if now.shape[1] > room:
+                colony.read_start(now.shape[1])
             arrays |= food_sources.arrays(
                 sources, arrays["worlds"], colony.n_food_sources, grid.size
             )
@@ -293,8 +289,8 @@ class _World:
 
     def _lay(self, cells: np.ndarray, level: int, number: int) -> None:
         """Set the levels of a pheromone in cells; 0 is the trail."""
-        clock = self.colony.trail_clock(self.w, number)
-        self.colony.stored_pheromone(self.w, number)[cells] = level + clock if level else 0
+        stored, clock = self.colony.stored_pheromone(self.w, number)
+        stored[cells] = level + clock if level else 0
 
     def _add(self, cells: np.ndarray, nests: np.ndarray) -> Change:
         """Put newborn ants of some nests on those of the cells that are empty."""
@@ -311,22 +307,18 @@ class _World:
         slots = np.flatnonzero(self.view("stage") == Stage.VACANT)[:n]
         numbers = rows[WorldRow.NEXT_NUMBER] + np.arange(n)
         headings = choose(self.all.stream(self.w).bits(n) >> np.uint64(32), N_HEADINGS)
-        castes: Any = 0
-        if len(colony.task.castes) > 1:
-            drawn = (self.all.stream(self.w).bits(n) >> np.uint64(32)) / 2.0**32
-            bounds = self.view("caste_chances").reshape(colony.n_nests, -1)[nests, :-1]
-            castes = np.count_nonzero(bounds <= drawn[:, None], axis=1)
         episode = int(colony.arrays["episodes"][self.w])
         born = (episode << 32) + numbers.astype(np.int64)
-        newborn = {
+        newborn: dict[str, Any] = {
             "cell": cells,
             "heading": headings,
             "number": numbers,
             "nest": nests,
-            "caste": castes,
             "stage": Stage.NEWBORN,
             "streams": stream_state(colony.seeds[self.w], STREAM_BORN, born),
         }
+        for feature in colony.model.features:
+            newborn |= feature.newborn(colony, self.w, nests, self.all.stream(self.w).bits)
         for name in colony.columns():
             self.view(name)[slots] = newborn[name] if name in newborn else COLUMNS[name].start
         ground[cells] = OBSTACLE | (ANT_STANDS - nests) << 4
@@ -436,16 +428,16 @@ class Interventions:
     def set_task(self, task: Task) -> None:
         """Set a task that differs only in settings that kernels read as numbers."""
         colony = self.colony
-        clocks = {
-            (world, number): colony.trail_clock(world, number)
-            for world in range(len(colony.worlds))
+        before = {
+            (w, number): colony.stored_pheromone(w, number)
+            for w in range(len(colony.worlds))
             for number, pheromone in enumerate(colony.pheromones)
             if not pheromone.dense
         }
         colony.set_task(task)
-        for which, clock in clocks.items():
-            stored = colony.stored_pheromone(*which)
-            stored[:] = np.where(stored > clock, stored - clock + colony.trail_clock(*which), 0)
+        for which, (stored, clock) in before.items():
+            _, now = colony.stored_pheromone(*which)
+            stored[:] = np.where(stored > clock, stored - clock + now, 0)
 
     def state(self) -> str:
         """Return a hash of the whole state; colonies with equal hashes behave identically."""

@@ -18,7 +18,7 @@ from taichi_ants.engines import views
 from taichi_ants.engines.colony import columns, layout, learning, life, own_inputs, steps, trail
 from taichi_ants.engines.colony.columns import function
 from taichi_ants.engines.colony.layout import Barrier, Order, WorldRow
-from taichi_ants.engines.colony.views import names_of
+from taichi_ants.engines.colony.views import entries_of
 from taichi_ants.features import hooks_at
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.task.model import Model
@@ -48,7 +48,7 @@ class Variant:
         self.mark_of_rest = STANDS if model.traffic.shared else 0
         # The hooks of features at each point, in their order.
         self.at = hooks_at(model.features)
-        self.names = names_of(model)
+        self.entries = entries_of(model)
         own = own_inputs.own_rules(model.rules)
         self.draw_by_cues = steps.draw_cell if model.choice == "deneubourg" else None
         if model.choice_rule:

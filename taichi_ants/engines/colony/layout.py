@@ -2,62 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
+from dataclasses import fields
 from enum import IntEnum, auto
-from functools import partial
-from typing import NamedTuple
+from typing import Any
 
-import numpy as np
-
+from taichi_ants.errors import check_one_of
 from taichi_ants.features import arrays
-from taichi_ants.features.feature import ANT, Feature
+from taichi_ants.features.castes import CASTES
+from taichi_ants.features.feature import ANT, Array
+from taichi_ants.features.foods import Food
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
 from taichi_ants.task.model import Model
 
-
-class Column(NamedTuple):
-    """An array with an entry for each slot: its value at the start, and the models that use it."""
-
-    dtype: type
-    start: int = 0
-    is_used: Callable[[Model], bool] = lambda model: True
-
-
-def _uses(feature: Feature, model: Model) -> bool:
-    return feature in model.features
-
-
 # Small values that each tick uses take one byte, which is a quarter of the memory traffic.
-COLUMNS = {
-    "cell": Column(np.int32),
+_CORE = (
+    Array("cell", ANT, "i4", "cells"),
     # Ticks since the pick-up of its food, or, if a field needs it, without food.
-    "carried": Column(np.int32),
-    "number": Column(np.int32, -1),  # -1 in a slot that was never used in this episode
+    Array("carried", ANT, "i4", "carried"),
+    # The number of its last ant; -1 in a slot that was never used in this episode.
+    Array("number", ANT, "i4", "numbers", start=-1),
     # The cell to enter or to take food from, else its own; later its previous cell.
-    "want": Column(np.int32),
+    Array("want", ANT, "i4"),
     # The state index, unless it is the paper's state.
-    "state": Column(np.int32, 0, lambda model: not model.sees_paper_state),
+    Array("state", ANT, "i4", "states", "i4", instead="paper_state"),
     # The reward of the last action, if rewards are by your own rule.
-    "reward": Column(np.int32, 0, lambda model: model.has_own_reward),
-    "heading": Column(np.int8),
-    "carries": Column(np.int8),
-    "stage": Column(np.int8),  # a `Stage`
-    "paper_state": Column(np.int8),  # which decides about actions and rewards
-    "event": Column(np.int8),  # the result of the last action, an `Event`
+    Array("reward", ANT, "i4"),
+    Array("heading", ANT, "i1", "headings"),
+    Array("carries", ANT, "i1", "carrying", "bool"),
+    Array("stage", ANT, "i1", "stages"),  # a `Stage`
+    Array("paper_state", ANT, "i1", "paper_states"),  # which decides about actions and rewards
+    Array("event", ANT, "i1", "events"),  # the result of the last action, an `Event`
     # The last action, -1 before the first one; or the next one, if actions are given.
-    "action": Column(np.int8, -1),
+    Array("action", ANT, "i1", "actions", start=-1),
     # The last action as executed, if actions slip; else it is `action`.
-    "executed": Column(np.int8, -1, lambda model: model.slips),
+    Array("executed", ANT, "i1", "executed", "i1", start=-1, instead="action"),
     # The next action if it is drawn already, else -1.
-    "next_action": Column(np.int8, -1, lambda model: model.draws_next_action),
-    "nest": Column(np.int8, 0, lambda model: model.n_nests > 1),
+    Array("next_action", ANT, "i1", "next_actions", start=-1),
+    Array("nest", ANT, "i1", "nests", "i4"),
     # The kind of the last food that it picked up.
-    "kind": Column(np.int8, 0, lambda model: model.n_kinds > 1),
-    **{
-        array.name: Column(np.dtype(array.dtype).type, 0, partial(_uses, feature))
-        for feature, array in arrays(ANT)
-    },
-}
+    Array("kind", ANT, "i1", "kinds", "i4"),
+)
+# The arrays with an entry for each slot by name; of features, too.
+COLUMNS = {array.name: array for array in (*_CORE, *(array for _, array in arrays(ANT)))}
+
+
+def columns_of(model: Model) -> list[Array]:
+    """Return the columns that a model needs."""
+    needs = {
+        "state": not model.sees_paper_state,
+        "reward": model.has_own_reward,
+        "executed": model.slips,
+        "next_action": model.draws_next_action,
+        "nest": model.n_nests > 1,
+        "kind": model.n_kinds > 1,
+        **{array.name: feature in model.features for feature, array in arrays(ANT)},
+    }
+    return [array for name, array in COLUMNS.items() if needs.get(name, True)]
 
 
 class Stage(IntEnum):
@@ -138,28 +139,14 @@ class Barrier(IntEnum):
 GAVE_UP = -(2**40)  # added to OPENED when the first part gives up, which keeps the number
 
 
-class CasteRow(IntEnum):
-    """The first rows of `castes`, one column for each caste; numbers of features follow."""
-
-    EPSILON = 0  # -1 if it has that of the colony
-    EPSILON_SPREAD = auto()
-    LEARNING_RATE = auto()  # -1 if it has that of the colony
-    DISCOUNT = auto()
-    TEMPERATURE = auto()
-    K = auto()
-    EXPONENT = auto()
-    LEARNS = auto()  # 0 if it follows a policy
-    LAYS = auto()  # a bit for each pheromone
-    CUES = auto()  # the number of its cues in `Task.all_cues`
+def _rows(names: Iterable[str]) -> Any:
+    return IntEnum("Row", [name.upper() for name in names], start=0)
 
 
-class FoodRow(IntEnum):
-    """Rows of `food_numbers`, one column for each kind of food; see `Food`."""
-
-    PICK_UP = 0
-    DELIVER = auto()
-    LOADS = auto()
-    REGROWTH = auto()  # -1 if it does not grow back
+# Rows of `castes`, one column for each caste; numbers of other features follow.
+CasteRow = _rows(CASTES.of_castes)
+# Rows of `food_numbers`, one column for each kind of food: the settings of `Food`.
+FoodRow = _rows(field.name for field in fields(Food))
 
 
 class FoodSourceRow(IntEnum):
@@ -196,12 +183,9 @@ def array_of(number: int, dense: bool) -> str:
     return f"field_{number}" if number else "level" if dense else "trail"
 
 
-def usual_schedule(n_worlds: int, capacity: int) -> str:
-    """Return the faster schedule for `n_worlds` worlds with `capacity` slots each."""
+def schedule_of(given: str | None, n_worlds: int, capacity: int, threads: int) -> tuple[str, int]:
+    """Return a schedule, by default the faster one, and the number of chunks of ants in a world."""
     large = capacity >= (_LARGE_ALONE if n_worlds == 1 else _LARGE_COLONY)
-    return "by_chunk" if large else "by_world"
-
-
-def chunks_of(schedule: str, threads: int) -> int:
-    """Return the number of chunks of ants in a world."""
-    return _CHUNKS_PER_THREAD * threads if schedule == "by_chunk" else 1
+    schedule = ("by_chunk" if large else "by_world") if given is None else given
+    check_one_of("schedule", schedule, ("by_world", "by_chunk"))
+    return schedule, _CHUNKS_PER_THREAD * threads if schedule == "by_chunk" else 1

@@ -22,7 +22,6 @@ from taichi_ants.engines.colony.layout import (
     NESTS_BY_KINDS,
     TALLY_WIDTH,
     TOTALS,
-    CasteRow,
     FoodRow,
     NestRow,
     Order,
@@ -30,23 +29,15 @@ from taichi_ants.engines.colony.layout import (
     SumRow,
     WorldRow,
     array_of,
-    chunks_of,
-    usual_schedule,
+    columns_of,
+    schedule_of,
 )
 from taichi_ants.engines.layout import compass_of, note_best_actions
-from taichi_ants.errors import (
-    AntsError,
-    as_array,
-    check_one_of,
-    checked_whole,
-    count,
-    entries_of,
-    expect,
-    shown,
-)
-from taichi_ants.features import arrays, numbers_of_castes, used_by
+from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole
+from taichi_ants.features import arrays
 from taichi_ants.features.feature import ANT, CASTE, NEST, Array
-from taichi_ants.features.support import BASE, CASTES, COLONY, refuse_unsupported
+from taichi_ants.features.foods import food_numbers
+from taichi_ants.features.support import COLONY
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state, words_of
@@ -67,7 +58,9 @@ Sharing = Literal["shared", "independent", "frozen"]
 SHARINGS: tuple[str, ...] = get_args(Sharing)
 Arrays = dict[str, np.ndarray]
 Which = slice | np.ndarray
-OF_ANTS = tuple(array.view for _, array in arrays(ANT))  # views of arrays of features
+# Views of arrays in snapshots: those of the core, and those of features.
+_IN_SNAPSHOTS = ("cells", "headings", "numbers", "actions", "events", "nests")
+OF_ANTS = tuple(array.view for _, array in arrays(ANT))
 ALL = slice(None)  # selects all worlds; a bool (W,) selects some
 
 _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
@@ -80,30 +73,16 @@ _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing",
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 
 
-def column(name: str, dtype: Any = None) -> property:
-    """Return a property: a writable view (W, capacity) of an array with an entry for each slot.
+def _view_of(array: Array) -> property:
+    """Return a property of a colony: a view (W, n) of an array with n entries for each world."""
 
-    With a dtype it is a copy, or zeros if this colony does not need the array.
-    """
+    def read(state: ColonyState) -> np.ndarray:
+        shape = len(state.seeds), state.sizes[array.per]
+        entries = state.arrays.get(array.name, state.arrays.get(array.instead))
+        entries = np.zeros(shape) if entries is None else entries.reshape(shape)
+        return entries.astype(array.shown_as) if array.shown_as else entries
 
-    def view(state: ColonyState) -> np.ndarray:
-        shape = len(state.seeds), state.capacity
-        if dtype is None:
-            return state.arrays[name].reshape(shape)
-        return state.arrays.get(name, np.zeros(shape, dtype)).reshape(shape).astype(dtype)
-
-    return property(view)
-
-
-def of_nests(array: Array) -> property:
-    """Return a property: a copy (W, nests) of an array of a feature, 0 if it is not used."""
-
-    def view(state: ColonyState) -> np.ndarray:
-        shape = len(state.seeds), state.n_nests
-        stored = state.arrays.get(array.name, np.zeros(shape))
-        return stored.reshape(shape).astype(array.shown_as)
-
-    return property(view)
+    return property(read)
 
 
 class ColonyState:
@@ -124,12 +103,20 @@ class ColonyState:
         ready: bool (W,), whether an episode has begun, and each change of it was completed.
         delivered: int64 (W,), food items delivered in previous episodes.
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
+        running: bool (W,), whether the episode of each world is still running.
+        episode_ticks: int32 (W,), ticks since the episode of each world began; a view.
+        deliveries: int32 (W,), deliveries of the present episode; a view.
+        living: bool (W, capacity), whether an ant lives in each slot.
+        queen_cells: int32 (W, nests), flat indices of the cells of queens; a view.
 
-    The arrays of features have views (W, capacity) or (W, nests) by their declared names, which are
-    copies, 0 in colonies without the feature.
+    Arrays by slot have views (W, capacity) by the names in `layout.COLUMNS`: `numbers`, `cells`,
+    `headings`, `paper_states`, `actions`, `events` and `next_actions`, which are writable, and
+    copies such as `states`, `executed`, `carrying` and `nests`. They hold what belongs to the last
+    ant in the slot. `streams` has the states of random streams, uint64. The arrays of features have
+    views (W, capacity) or (W, nests), too, which are 0 in colonies without the feature.
     """
 
-    if TYPE_CHECKING:  # the views of arrays of features, see below
+    if TYPE_CHECKING:  # the views of arrays, see below
 
         def __getattr__(self, name: str) -> np.ndarray: ...
 
@@ -155,55 +142,25 @@ class ColonyState:
         self.ants, self.start, self.ends_at_delivery = int(ants), start, bool(ends_at_delivery)
         check_one_of("sharing", sharing, SHARINGS)
         self.sharing, self.learns = sharing, sharing != "frozen"
-        self.has_training = training is not None or self.learns or q_values is not None
+        given = arguments.checked_training(training, task, sharing, q_values is not None)
+        self.has_training, self.training = given is not None, given or _NO_TRAINING
         self.is_given_actions = task.choice.needs_table and not self.has_training
-        if self.has_training and not task.choice.needs_table:
-            raise AntsError(
-                f"`task.choice.rule` is {task.choice.rule!r}, so ants choose without action "
-                f"values, but sharing is {shown(sharing)} and there is a training or q_values; set "
-                'sharing to "frozen" and training to None, and leave out q_values.'
-            )
-        if self.has_training:
-            expect("training", training, TrainingConfig)
-        (self.training,) = arguments.checked_configs(training or _NO_TRAINING)
-        policies = [name for name, caste in task.castes.items() if caste.policy is not None]
-        follows = 0 < len(task.castes) == len(policies)
-        if self.has_training and not (self.learns or follows) and q_values is None:
-            raise AntsError(
-                "sharing is 'frozen', but q_values is None; give the action values that the ants "
-                "follow, because they do not learn."
-            )
-        if self.learns:
-            arguments.check_learner(self.training, task, sharing)
-        if self.is_given_actions:
-            refuse_unsupported("a colony with given actions", task.uses(), BASE - CASTES)
-        if policies and sharing == "independent":
-            raise AntsError(
-                f"`task.castes.{policies[0]}.policy` is {task.castes[policies[0]].policy!r}, but "
-                'sharing is "independent", so each ant learns into its own table; set sharing to '
-                '"shared" or "frozen".'
-            )
         table = None if q_values is None else checked_values(q_values, task)
         self.seeds = arguments.checked_seeds(seeds)
         running = runtime.start(threads, arch)
         runtime.check_on_cpu(running, "colonies run")
-        schedule = usual_schedule(len(self.seeds), self.capacity) if schedule is None else schedule
-        check_one_of("schedule", schedule, ("by_world", "by_chunk"))
-        self.schedule, self.chunks = schedule, chunks_of(schedule, running.threads)
-        worlds = checked_worlds(world, len(self.seeds), self.learns)
-
-        self.n_nests, self.n_kinds = worlds[0].n_nests, max(1, len(task.foods))
-        by_slot = not self.learns and table is not None and table.ndim == 4 and not task.castes
-        if by_slot and self.n_nests > 1:  # or by nest, see `owners`
-            assert table is not None
-            by_slot = table.shape[1] != self.n_nests
+        sizes = len(self.seeds), self.capacity, running.threads
+        self.schedule, self.chunks = schedule_of(schedule, *sizes)
+        self.n_kinds, self.n_nests = max(1, len(task.foods)), 0
+        worlds = self.checked_worlds(world)
+        self.n_nests, shape = worlds[0].n_nests, () if table is None else table.shape
+        # A table (W, n, ...) is by nest if n is the number of several nests, see `owners`.
+        by_slot = len(shape) == 4 and (self.n_nests == 1 or shape[1] != self.n_nests)
+        by_slot = by_slot and not self.learns and not task.castes
         self.one_a_slot = by_slot or sharing == "independent"
-        for name, caste in task.castes.items():
-            if caste.nest is not None and caste.nest >= self.n_nests:
-                raise AntsError(
-                    f"`task.castes.{name}.nest` is {caste.nest}, but the world has "
-                    f"{count(self.n_nests, 'nest')}, numbered from 0; choose one of them."
-                )
+        for feature in self.model.features:
+            for refusal in feature.refusals(self):
+                raise AntsError(refusal)
         self.pheromones = task.pheromones_while(self.learns)
         self.memory, model = Memory(), self.model
         if model.learner is not None and (self.one_a_slot or model.plans_together):
@@ -239,76 +196,25 @@ class ColonyState:
     def ticks(self, ticks: int) -> None:
         self.arrays["orders"][Order.PASSED] = ticks
 
-    @property
-    def running(self) -> np.ndarray:
-        """Whether the episode of each world is still running, bool (W,)."""
-        return self.arrays["worlds"][WorldRow.RUNNING] == 1
-
-    @property
-    def episode_ticks(self) -> np.ndarray:
-        """Ticks since the episode of each world began, int32 (W,); a view."""
-        return self.arrays["worlds"][WorldRow.TICKS]
-
-    @property
-    def deliveries(self) -> np.ndarray:
-        """Deliveries of the present episode, int32 (W,); a view."""
-        return self.arrays["worlds"][WorldRow.DELIVERIES]
+    running = property(lambda colony: colony.arrays["worlds"][WorldRow.RUNNING] == 1)
+    episode_ticks = property(lambda colony: colony.arrays["worlds"][WorldRow.TICKS])
+    deliveries = property(lambda colony: colony.arrays["worlds"][WorldRow.DELIVERIES])
+    living = property(lambda colony: colony.stages == Stage.LIVING)
+    queen_cells = property(lambda colony: colony.of_nests(NestRow.QUEEN_CELL))
+    streams = _view_of(Array("streams", ANT, "u8"))
 
     def part(self, name: str, world: int) -> np.ndarray:
         """Return a view of a world's part of an array that has only parts of worlds."""
         return self.arrays[name].reshape(len(self.seeds), -1)[world]
 
-    # Arrays (W, capacity) by slot: the number of its last ant, int32, -1 for none; the flat index
-    # of its cell, int32; its heading 0 to 5, paper_state (see `task.states`), last action (-1
-    # before the first) and `Event`, int8; the action drawn ahead for the next tick, int8, or -1;
-    # and the state of its random stream, uint64. If actions slip, `actions` are those that ants
-    # chose.
-    numbers, cells, headings = column("number"), column("cell"), column("heading")
-    paper_states, actions, events = column("paper_state"), column("action"), column("event")
-    next_actions, streams = column("next_action"), column("streams")
-    _stages, _loads, _states = column("stage"), column("carries"), column("state")
-    _executed, _carried, _kinds = column("executed"), column("carried"), column("kind")
-    nests = column("nest", np.int32)  # a copy (W, capacity) of those of the last ant in each slot
-
-    @property
-    def living(self) -> np.ndarray:
-        """Whether an ant lives in each slot, bool (W, capacity)."""
-        return self._stages == Stage.LIVING
-
-    @property
-    def carrying(self) -> np.ndarray:
-        """Whether the ant of each slot carries food, bool (W, capacity)."""
-        return self._loads == 1
-
-    @property
-    def states(self) -> np.ndarray:
-        """The state index of the last ant in each slot, int32 (W, capacity)."""
-        return (self._states if "state" in self.arrays else self.paper_states).astype(np.int32)
-
-    @property
-    def executed(self) -> np.ndarray:
-        """The last actions as executed, int8 (W, capacity); unless actions slip, `actions`."""
-        return self._executed if "executed" in self.arrays else self.actions
+    def of_nests(self, row: int) -> np.ndarray:
+        """Return a view (W, nests) of a row of the numbers of nests."""
+        return self.arrays["nests"][row].reshape(len(self.seeds), -1)
 
     @property
     def occupied(self) -> np.ndarray:
         """Whether an ant is on each cell, bool (W, grid.size)."""
         return self.arrays["ground"].reshape(len(self.seeds), -1) >> 4 != 0
-
-    def update_weights_of(self, castes: np.ndarray, ants: np.ndarray) -> np.ndarray:
-        """Return the weight of the mean error of several ants of a caste in an update.
-
-        Arrays (n,), int and float64. Castes that do not learn have the weight 0.
-        """
-        weights = self.arrays["weights"]
-        weights = weights[np.minimum(ants, len(weights) - 1)]
-        if "castes" not in self.arrays:
-            return weights
-        own = self.arrays["caste_weights"]
-        of_castes = own[castes, np.minimum(ants, own.shape[1] - 1)]
-        rows = self.arrays["castes"]
-        weights = np.where(rows[CasteRow.LEARNING_RATE, castes] >= 0, of_castes, weights)
-        return np.where(rows[CasteRow.LEARNS, castes] == 1, weights, 0.0)
 
     @property
     def nbytes(self) -> int:
@@ -323,23 +229,20 @@ class ColonyState:
         With a table for each slot (W, slots, n_states, 5). If several nests or castes share tables,
         they have axes after W: (W, nests, castes, n_states, 5).
         """
-        tables = self.arrays["q"].reshape(
-            len(self.seeds), self.owners, -1, self.task.n_states, ROW
-        )[:, :, 0, :, :N_ACTIONS]
-        shape = len(self.seeds), *self._axes.values(), self.task.n_states, N_ACTIONS
-        return tables.reshape(shape).copy()
+        shape = len(self.seeds), *self._axes.values(), -1, self.task.n_states, ROW
+        return self.arrays["q"].reshape(shape)[..., 0, :, :N_ACTIONS].copy()
 
     @property
     def _axes(self) -> dict[str, int]:
         """The numbers of slots that own tables, or else of nests and castes if several do."""
-        axes = {"nest": self.n_nests, "caste": self.model.n_groups // self.n_nests}
-        several = {name: n for name, n in axes.items() if n > 1}
-        return {"slot": self.capacity} if self.one_a_slot else several
+        if self.one_a_slot:
+            return {"slot": self.capacity}
+        return {per: n for per, n in self.sizes.items() if n > 1 and per != ANT}
 
     @property
-    def _numbers_of(self) -> dict[str, int]:
-        """The numbers of nests and castes in each world."""
-        return {NEST: self.n_nests, CASTE: self.model.n_castes}
+    def sizes(self) -> dict[str, int]:
+        """The numbers of slots, nests and castes in each world."""
+        return {ANT: self.capacity, NEST: self.n_nests, CASTE: self.model.n_castes}
 
     @property
     def owners(self) -> int:
@@ -351,7 +254,7 @@ class ColonyState:
         """The table of `owners` by which the last ant in each slot acts, int32 (W, capacity)."""
         if self.one_a_slot:
             return np.tile(np.arange(self.capacity, dtype=np.int32), (len(self.seeds), 1))
-        return self.nests * np.int32(self.model.n_groups // self.n_nests) + self.castes
+        return self.nests * np.int32(max(1, self.model.n_castes)) + self.castes
 
     @property
     def rewards(self) -> np.ndarray:
@@ -359,12 +262,9 @@ class ColonyState:
         if "reward" in self.arrays:
             return self.arrays["reward"].reshape(self.events.shape).copy()
         rewards = self.task.rewards.by_event()[self.events]
-        if self.task.foods:
-            kinds = self._kinds if self.n_kinds > 1 else 0
-            picked_up, delivered = self.arrays["food_numbers"][:2, kinds]
-            rewards = np.where(self.events == Event.PICKED_UP, picked_up, rewards)
-            rewards = np.where(self.events == Event.DELIVERED, delivered, rewards)
-        return rewards
+        picked_up, delivered = self.arrays["food_numbers"][:2, self.kinds]
+        rewards = np.where(self.events == Event.PICKED_UP, picked_up, rewards)
+        return np.where(self.events == Event.DELIVERED, delivered, rewards)
 
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
@@ -378,10 +278,9 @@ class ColonyState:
         apart = deliveries = self.deliveries.astype(np.int32)
         if self.model.counts_by_nest_and_kind:
             apart = arrays["deliveries_by_nest_and_kind"]
-        stores = arrays["nests"][NestRow.STORE].reshape(n, -1)
         return {
             **{row.name.lower(): arrays["totals"][row] for row in TOTALS},
-            "waiting_births": stores.sum(axis=1, dtype=np.int32),
+            "waiting_births": self.of_nests(NestRow.STORE).sum(axis=1, dtype=np.int32),
             **{row.name.lower(): rows[row] for row in WorldRow if row >= WorldRow.TICKS},
             "deliveries_by_nest_and_kind": apart.reshape(n, self.n_nests, self.n_kinds),
             "caste_deliveries": arrays.get("caste_deliveries", deliveries).reshape(n, -1),
@@ -390,68 +289,49 @@ class ColonyState:
     def snapshot(self, world: int = 0) -> Snapshot:
         """Return the present state of world number `world`; arrays are copies."""
         self.check_begun()
-        world = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
-        living = self.living[world]
-        ant_cells = self.cells[world, living]
-        ground = self.part("ground", world).copy()
-        ground[ant_cells] = EMPTY
-        carries = self.carrying[world, living]
-        fields = {}
-        for name in (TRAIL, *self.task.fields):
-            stored, clock = self.stored_trail(world, name)
-            fields[name] = np.maximum(stored - stored.dtype.type(clock), 0)
-        of_ants, of_cells = np.zeros(len(ant_cells), np.int32), np.zeros(self.grid.size, np.uint8)
-        if self.n_kinds > 1:
-            of_ants = self._kinds[world, living].astype(np.int32)
-            of_cells = np.where(ground == FOOD, self.part("kind_of", world), np.uint8(0))
-        queens = self.arrays["nests"][NestRow.QUEEN_CELL].reshape(len(self.seeds), -1)[world]
-        of_world = {name: array[world] for name, array in self._counts().items()}
-        by_nest_and_kind = of_world.pop("deliveries_by_nest_and_kind")
-        counts: dict[str, Any] = {n: int(entry) for n, entry in of_world.items() if not entry.ndim}
-        counts["nest_deliveries"] = by_nest_and_kind.sum(axis=1, dtype=np.int32)
-        counts["food_deliveries"] = by_nest_and_kind.sum(axis=0, dtype=np.int32)
+        w = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
+        slots, further = self.living[w], {}
+        shown = {name: getattr(self, name)[w, slots] for name in (*_IN_SNAPSHOTS, *OF_ANTS)}
+        ants = {f"ant_{name}": shown[name].astype(np.int32) for name in _IN_SNAPSHOTS}
+        carries = self.carrying[w, slots]
+        ground = self.part("ground", w).copy()
+        ground[ants["ant_cells"]] = EMPTY
+        kinds = self.part("kind_of", w) if self.n_kinds > 1 else np.uint8(0)
+        for number, name in enumerate((TRAIL, *self.task.fields)):
+            stored, clock = self.stored_pheromone(w, number)
+            further[name] = np.maximum(stored - stored.dtype.type(clock), 0)
+        of_world = {name: array[w] for name, array in self._counts().items()}
+        counts: dict[str, Any] = {name: int(n) for name, n in of_world.items() if not n.ndim}
+        apart = of_world["deliveries_by_nest_and_kind"]
+        counts["nest_deliveries"] = apart.sum(axis=1, dtype=np.int32)
+        counts["food_deliveries"] = apart.sum(axis=0, dtype=np.int32)
         counts["caste_deliveries"] = of_world["caste_deliveries"].copy()
         return Snapshot(
             self.grid,
             ground,
-            fields[TRAIL],
-            ant_cells,
-            self.headings[world, living].astype(np.int32),
-            carries,
-            ant_carried=np.where(carries, self._carried[world, living], np.int32(0)),
-            ant_numbers=self.numbers[world, living],
-            ant_actions=self.actions[world, living].astype(np.int32),
-            ant_events=self.events[world, living].astype(np.int32),
-            ant_nests=self.nests[world, living],
-            ant_foods=np.where(carries, of_ants, np.int32(-1)),
-            food_kinds=of_cells,
-            queens=queens.astype(np.int32),
-            of_ants={view: getattr(self, view)[world, living] for view in OF_ANTS},
-            fields=fields,
+            further[TRAIL],
+            **ants,
+            ant_carries=carries,
+            ant_carried=np.where(carries, self.carried[w, slots], np.int32(0)),
+            ant_foods=np.where(carries, self.kinds[w, slots], np.int32(-1)),
+            food_kinds=np.where(ground == FOOD, kinds, np.uint8(0)),
+            queens=self.queen_cells[w].copy(),
+            of_ants={name: shown[name] for name in OF_ANTS},
+            fields=further,
             counts=counts,
-            world=self.worlds[world],
+            world=self.worlds[w],
         )
 
-    def stored_trail(self, world: int = 0, field: str = TRAIL) -> tuple[np.ndarray, int]:
-        """Return a copy of the trail of world number `world` as kernels store it, and the clock.
+    def stored_pheromone(self, world: int, number: int) -> tuple[np.ndarray, int]:
+        """Return a view of a pheromone as kernels store it, and its clock; 0 is the trail.
 
-        `field` is the name of another pheromone; AntsError if there is none. The stored trail has
-        expiry clocks, int32 (grid.size,). If the pheromone is dense, it has levels, float32, and
-        the clock is 0. The level of a cell is max(stored - clock, 0).
+        A pheromone in whole numbers has expiry clocks, int32 (grid.size,). A dense one has levels,
+        float32, and its clock is 0. The level of a cell is max(stored - clock, 0).
         """
-        check_one_of("field", field, (TRAIL, *self.task.fields))
-        number = self.task.number_of(field)
-        return self.stored_pheromone(world, number).copy(), self.trail_clock(world, number)
-
-    def stored_pheromone(self, world: int, number: int) -> np.ndarray:
-        """Return a view of a pheromone as kernels store it, by its number."""
-        return self.part(array_of(number, self.pheromones[number].dense), world)
-
-    def trail_clock(self, world: int, number: int = 0) -> int:
-        """Return the amount by which a pheromone in whole numbers has evaporated this episode."""
         pheromone = self.pheromones[number]
         falls = pheromone.evaporation == "linear" and not pheromone.dense
-        return int(self.episode_ticks[world]) * falls
+        stored = self.part(array_of(number, pheromone.dense), world)
+        return stored, int(self.episode_ticks[world]) * falls
 
     def check_begun(self) -> None:
         """Raise an AntsError unless all worlds are in an episode, whose changes are complete."""
@@ -468,19 +348,13 @@ class ColonyState:
 
     # Changes
 
+    def checked_worlds(self, world: World | Sequence[World]) -> tuple[World, ...]:
+        """Return one world per seed; AntsError if their number is wrong or one does not fit."""
+        known = len(self.seeds), self.learns, self.n_kinds, self.n_nests
+        return arguments.checked_worlds(world, *known)
+
     def lay_out(self, worlds: tuple[World, ...]) -> None:
         """Make the arrays that depend on the worlds; AntsError if they have too few free cells."""
-        for world in worlds:
-            if world.n_nests != self.n_nests:
-                raise AntsError(
-                    f"a world has {count(world.n_nests, 'nest')}, but another one {self.n_nests}; "
-                    "all worlds of a colony must have the same number."
-                )
-            if world.n_food_kinds > self.n_kinds:
-                raise AntsError(
-                    f"the world has {count(world.n_food_kinds, 'kind')} of food, but the task "
-                    f"{self.n_kinds}; add the others to `task.foods`."
-                )
         self.worlds, self.grid = worlds, worlds[0].grid
         self.changed = np.zeros(len(worlds), bool)
         most = max(len(world.foods) for world in worlds)
@@ -489,38 +363,19 @@ class ColonyState:
 
     def make_room_for_food(self, n: int) -> None:
         """Reset all arrays of episodes, with room for n food sources in each world."""
-        self._read_start(n)
-        slots, cells = len(self.worlds) * self.capacity, len(self.worlds) * self.grid.size
-        dense, model = self.model.dense_by_number, self.model
-        made = {
-            **{name: array.copy() for name, array in self.at_start.items()},
-            "trail": np.zeros(1 if dense[0] else cells, np.int32),
-            "level": np.zeros(cells if dense[0] else 1, np.float32),
-            **self._further_fields(cells),
-        }
-        for dtype in (np.int32, np.int8, np.float32):
-            used = [x for x, c in COLUMNS.items() if c.dtype is dtype and c.is_used(model)]
+        self.read_start(n)
+        made = {name: array.copy() for name, array in self.at_start.items()}
+        made |= self._pheromones(len(self.worlds) * self.grid.size)
+        dense = self.model.dense_by_number[0]  # of the trail; the other array is not in use
+        made[array_of(0, not dense)] = np.zeros(1, np.int32 if dense else np.float32)
+        for dtype in ("i4", "i1", "f4"):
+            used = [array.name for array in columns_of(self.model) if array.dtype == dtype]
             # One allocation, because columns at equal offsets in pages slow each other down.
-            made |= zip(used, np.zeros((len(used), slots), dtype), strict=True)
+            columns = np.zeros((len(used), len(self.worlds) * self.capacity), dtype)
+            made |= zip(used, columns, strict=True)
         self._changing = tuple(made)
         self.arrays |= made
-        self._set_to_start()
-
-    def make_food_sources_fit(self, n: int) -> None:
-        """Let the start of episodes have room for n food sources in each world, if it has less."""
-        if n > self.n_food_sources:
-            self._read_start(n)
-
-    def reset(self, which: Which) -> None:
-        """Reset the arrays of worlds, and begin the random streams of their next episode."""
-        self._set_to_start(which)
-        stale = np.zeros_like(self.changed)
-        stale[which] = self.changed[which]
-        if stale.any():
-            self._copy_worlds(self._ground_constants(), stale)
-            self.changed[stale] = False
-        self._copy_worlds({"streams": self.arrays["first_streams"]}, which)
-        self.arrays["episodes"][which] += 1
+        self.set_to_start()
 
     def count_deliveries(self, which: Which = ALL) -> None:
         """Add the deliveries of the episode to those of the previous ones."""
@@ -534,15 +389,6 @@ class ColonyState:
         self.task, self.pheromones = task, task.pheromones_while(self.learns)
         self.arrays |= self._settings()
 
-    def reseed(self, which: np.ndarray, seeds: Sequence[int]) -> None:
-        """Set new seeds for some worlds, bool (W,), as if they had had no episodes."""
-        (places,) = np.nonzero(which)
-        changed = dict(zip(places.tolist(), seeds, strict=True))
-        self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
-        self.arrays["seeds"][:] = words_of(self.seeds)
-        self._read_start(self.n_food_sources)
-        self._copy_worlds(self._seeded(), which)
-
     def stop(self, which: np.ndarray) -> None:
         """End the episode of some worlds, bool (W,), which then wait for their next episode."""
         self.arrays["worlds"][WorldRow.RUNNING, which] = 0
@@ -551,7 +397,7 @@ class ColonyState:
         """Save the random streams of the ants that started the episode of these worlds."""
         ours = np.zeros((len(self.seeds), 1), bool)
         ours[which] = True
-        there = (self._stages != Stage.VACANT) & ours
+        there = (self.stages != Stage.VACANT) & ours
         worlds, slots = np.nonzero(there & (self.numbers >= 0) & (self.numbers < self.ants))
         first_streams = self.arrays["first_streams"].reshape(self.numbers.shape)
         first_streams[worlds, self.numbers[worlds, slots]] = self.streams[worlds, slots]
@@ -559,11 +405,15 @@ class ColonyState:
     def set_learning_rate(self, learning_rate: float) -> None:
         """Set the learning rate and the update weights."""
         self.learning_rate = learning_rate
-        most = self.capacity if self.sharing == "shared" else 1
-        weights, kept = update_weights(learning_rate, most), self.arrays["weights"]
+        weights, kept = self.update_weights(learning_rate), self.arrays["weights"]
         if len(weights) > len(kept):  # rare, because Taichi leaks some bytes for each new array
-            kept = self.arrays["weights"] = np.empty(min(2 * len(weights), most + 1), np.float32)
+            room = min(2 * len(weights), self.capacity + 1)
+            kept = self.arrays["weights"] = np.empty(room, np.float32)
         kept[: len(weights)], kept[len(weights) :] = weights, weights[-1]
+
+    def update_weights(self, learning_rate: float) -> np.ndarray:
+        """Return the weight of the mean of n TD errors in an update, by n."""
+        return update_weights(learning_rate, self.capacity if self.sharing == "shared" else 1)
 
     def sort_ants(self) -> None:
         """Sort the ants of a world roughly by cell, so that neighbours share caches.
@@ -580,7 +430,7 @@ class ColonyState:
     def close_gaps(self) -> None:
         """Move vacant slots behind those with ants, unless slots matter."""
         if not self.model.slots_matter:
-            self._sort_slots(self._stages == Stage.VACANT)
+            self._sort_slots(self.stages == Stage.VACANT)
 
     def _sort_slots(self, keys: np.ndarray) -> None:
         """Sort the slots of each world by keys (W, capacity), equal ones in their present order."""
@@ -595,38 +445,27 @@ class ColonyState:
 
     # Arrays
 
-    def _read_start(self, n_food_sources: int) -> None:
-        """Set the arrays with which worlds and ants begin each episode, see `_set_to_start`."""
+    def read_start(self, n_food_sources: int) -> None:
+        """Set the arrays with which worlds and ants begin each episode, see `set_to_start`."""
         self.n_food_sources = n_food_sources
         worlds, n, model = self.worlds, self.ants, self.model
-        starts = [
-            world.start(seed, n, self.start) for world, seed in zip(worlds, self.seeds, strict=True)
-        ]
+        starts = [w.start(seed, n, self.start) for w, seed in zip(worlds, self.seeds, strict=True)]
         cells = np.stack([cells for cells, _ in starts])
-        nests = self._of_each(lambda world: world.nests_of(n))
+        self.nests_at_start = nests = self._of_each(lambda world: world.nests_of(n))
         # Columns of the ants by world and number.
-        self.first = {
-            "cell": cells,
-            "heading": np.array([headings for _, headings in starts], np.int8),
-        }
-        if model.n_nests > 1:
-            self.first["nest"] = nests.astype(np.int8)
-        self.nests_at_start = nests
+        headings = np.array([headings for _, headings in starts], np.int8)
+        self.first = {"cell": cells, "heading": headings, "nest": nests.astype(np.int8)}
         for feature in model.features:
             self.first |= feature.columns(self)
-        ground = self._of_each(World.ground)
-        loads = np.array([food.loads for food in self.task.foods.values()] or [1], np.int32)
-        kinds = self._of_each(World.kinds_by_cell)
-        loads = np.where(ground == FOOD, loads[kinds], 0).astype(np.int32)
+        ground, kinds = self._of_each(World.ground), self._of_each(World.kinds_by_cell)
+        loads = np.where(ground == FOOD, food_numbers(self.task)[FoodRow.LOADS, kinds], 0)
         marks = (ANT_GROUND - (nests << 4)).astype(np.uint8)
         np.put_along_axis(ground, cells.astype(np.int64), marks, axis=1)
         levels = self._of_each(World.trail_levels)
         levels = levels if levels.any() else levels[:, :1].copy()  # all cells are equal
         rows = np.zeros((len(WorldRow), len(worlds)), np.int32)
-        rows[WorldRow.RUNNING] = 1
-        for row in (WorldRow.TOP, WorldRow.FIRST_VACANT, WorldRow.LIVING, WorldRow.NEXT_NUMBER):
-            rows[row] = n
-        rows[WorldRow.FIRST_DELIVERY] = -1
+        rows[[WorldRow.TOP, WorldRow.FIRST_VACANT, WorldRow.LIVING, WorldRow.NEXT_NUMBER]] = n
+        rows[WorldRow.RUNNING], rows[WorldRow.FIRST_DELIVERY] = 1, -1
         of_nests = np.zeros((len(NestRow), len(worlds) * self.n_nests), np.int32)
         queens = self._of_each(lambda world: world.grid.index(world.queens))
         of_nests[NestRow.QUEEN_CELL] = queens.reshape(-1)
@@ -634,10 +473,10 @@ class ColonyState:
         self.at_start = {
             # The ground of each cell, and the mark of the ant on it, see `layout`.
             "ground": ground.reshape(-1),
-            # The clock at which a cell's trail has evaporated; if dense, its level.
+            # The clock at which a cell's trail has evaporated; if dense, its level. The same for
+            # each further field, which is empty at the start.
+            **self._pheromones(len(worlds)),
             array_of(0, model.dense_by_number[0]): levels.reshape(-1),
-            # The same for each further field, which is empty at the start.
-            **self._further_fields(len(worlds)),
             "worlds": rows,
             "nests": of_nests,
             # The kind of the food in each cell, and its loads; tiny if kernels do not need them.
@@ -645,7 +484,7 @@ class ColonyState:
             "loads": loads.reshape(-1) if model.has_loads else np.zeros(1, np.int32),
             "deliveries_by_nest_and_kind": np.zeros(of_nests.shape[1] * self.n_kinds, np.int32),
             **{
-                array.name: np.zeros(len(worlds) * self._numbers_of[array.per], array.dtype)
+                array.name: np.zeros(len(worlds) * self.sizes[array.per], array.dtype)
                 for feature in model.features
                 for array in feature.arrays
                 if array.per != ANT
@@ -655,16 +494,16 @@ class ColonyState:
             **food_sources.arrays(foods, rows, n_food_sources, self.grid.size),
         }
 
-    def _further_fields(self, n: int) -> Arrays:
-        """Return empty arrays (n,) of the pheromones except the trail."""
+    def _pheromones(self, n: int) -> Arrays:
+        """Return empty arrays (n,) of all pheromones."""
         return {
             array_of(number, dense): np.zeros(n, np.float32 if dense else np.int32)
-            for number, dense in enumerate(self.model.dense_by_number[1:], start=1)
+            for number, dense in enumerate(self.model.dense_by_number)
         }
 
-    def _set_to_start(self, which: Which = ALL) -> None:
+    def set_to_start(self, which: Which = ALL) -> None:
         """Reset the arrays that change in an episode, for these worlds."""
-        self._copy_worlds(self.at_start, which)
+        self.copy_worlds(self.at_start, which)
         shape, n = (len(self.worlds), self.capacity), self.first["cell"].shape[1]
         starts: Arrays = {**self.first, "number": np.arange(n), "stage": np.array(Stage.LIVING)}
         for name in COLUMNS.keys() & self.arrays.keys():
@@ -686,14 +525,14 @@ class ColonyState:
             )
         return {
             "streams": np.zeros(n_worlds * slots, np.uint64),
-            **self._seeded(),
+            **self.seeded(),
             # By world or slot: the table, then further tables of the learner; its memory.
             "q": self._tables(q_values),
             "floats": np.zeros(max(1, owners * memory.floats), np.float32),
             "integers": np.zeros(max(1, owners * memory.integers), np.int32),
         }
 
-    def _seeded(self) -> Arrays:
+    def seeded(self) -> Arrays:
         """Return the arrays that depend on seeds and last through all episodes."""
         seeds = words_of(self.seeds)
         numbers = np.arange(self.capacity, dtype=np.uint64)  # more ants may start later episodes
@@ -711,20 +550,8 @@ class ColonyState:
         q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
         q[..., :N_ACTIONS] = self.training.initial_q
         if q_values is not None:
-            leading, form, axes = q_values.shape[:-2], f"{n_states}, {N_ACTIONS}", self._axes
-            known = {(): 1, (n_worlds,): 1, (n_worlds, *axes.values()): slots}
-            if leading not in known:
-                forms = {"world": (n_worlds,), " and ".join(axes): (n_worlds, *axes.values())}
-                listed = [
-                    f"({', '.join(map(str, axis))}, {form}) for one table per {owner}"
-                    for owner, axis in forms.items()
-                    if owner
-                ]
-                raise AntsError(
-                    f"q_values has shape {q_values.shape}; give ({form}), {', or '.join(listed)}."
-                )
-            given = (n_worlds, known[leading]) if leading else ()
-            q[..., :N_ACTIONS] = q_values.reshape(*given, 1, n_states, N_ACTIONS)
+            tables = arguments.checked_tables(q_values, n_worlds, self._axes)
+            q[..., :N_ACTIONS] = tables[..., None, :, :]
         for number, (name, caste) in enumerate(self.task.castes.items()):
             if caste.policy is not None:
                 path = f"`task.castes.{name}.policy`"
@@ -741,7 +568,7 @@ class ColonyState:
         pairs = self.task.n_states * ROW * tables
         sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
         return {
-            **self._ground_constants(),
+            **self.ground_constants(),
             "compass": compass_of(self.grid),  # see `rules.actions`
             "seeds": words_of(self.seeds),
             **self._settings(),
@@ -770,52 +597,40 @@ class ColonyState:
 
     def _settings(self) -> Arrays:
         """Return the settings of the task as kernels read them."""
-        task, settings = self.task, {}
-        rules = [value for rule in task.rules.values() for value in vars(rule).values()]
+        task = self.task
+        settings = {
+            "rewards": task.rewards.by_event(),
+            "choice": task.choice.numbers(),
+            "food_numbers": food_numbers(task),
+        }
         for feature in self.model.features:
             if feature.numbers:
                 values = (getattr(feature.of(task), name) for name in feature.numbers)
                 settings[f"{feature.group}_numbers"] = np.array([value or 0.0 for value in values])
-        if task.castes:
-            most = self.capacity if self.sharing == "shared" else 1
-            rates = [caste.learning_rate or 0.0 for caste in task.castes.values()]
-            weights = [update_weights(rate, most) for rate in rates]
-            longest = max(map(len, weights))
-            settings |= {
-                "castes": _caste_numbers(task),
-                # By caste and n, see `update_weights`; unused without an own learning rate.
-                "caste_weights": np.stack(
-                    [np.pad(one, (0, longest - len(one)), mode="edge") for one in weights]
-                ),
-            }
         for feature in self.model.features:
             settings |= feature.constants(self)
         if task.rules:  # the parameters of your own rules
+            rules = [value for rule in task.rules.values() for value in vars(rule).values()]
             settings["rule_numbers"] = np.array([*rules, 0.0], np.float64)
-        return {
-            "rewards": task.rewards.by_event(),
-            "choice": task.choice.numbers(),
-            "food_numbers": _food_numbers(task),
-            **settings,
-        }
+        return settings
 
-    def _ground_constants(self) -> Arrays:
+    def ground_constants(self) -> Arrays:
         """Return the constants that depend on rocks and the queen."""
         return {
             # 1 for rocks and outside.
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
             # By cell: a bit for each heading that leads nearer to the queen.
             "closer": self._of_each(
-                lambda world: np.stack([world.closer(nest) for nest in range(world.n_nests)])
+                lambda world: [world.closer(nest) for nest in range(world.n_nests)]
             ).reshape(-1),
         }
 
-    def _of_each(self, make: Callable[[World], np.ndarray]) -> np.ndarray:
+    def _of_each(self, make: Callable[[World], Any]) -> np.ndarray:
         """Return an array for each world, made once for equal worlds."""
         made = {world: make(world) for world in dict.fromkeys(self.worlds)}
         return np.stack([made[world] for world in self.worlds])
 
-    def _copy_worlds(self, source: Arrays, which: Which) -> None:
+    def copy_worlds(self, source: Arrays, which: Which) -> None:
         """Copy some worlds from other arrays; worlds are consecutive in the last axis."""
         n_worlds = len(self.seeds)
         for name, array in source.items():
@@ -869,8 +684,6 @@ class ColonyState:
         runtime.start(threads, arch)  # first, because its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):
             training = facts["training"] and TrainingConfig(**facts["training"])
-            if training is not None:
-                learners.get(training.learner)
             worlds = [World.from_dict(world) for world in facts["worlds"]]
             task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
             if options["sharing"] == "frozen" and training is not None:
@@ -896,46 +709,11 @@ class ColonyState:
         if not isinstance(other, ColonyState):
             return NotImplemented
         (facts, arrays), (other_facts, other_arrays) = self.contents(), other.contents()
-        return (
-            facts == other_facts
-            and arrays.keys() == other_arrays.keys()
-            and all(same(array, other_arrays[name]) for name, array in arrays.items())
-        )
+        return facts == other_facts and same(arrays, other_arrays)
 
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
 
 
-for _, array in arrays(ANT):
-    setattr(ColonyState, array.view, column(array.name, np.dtype(array.shown_as)))
-for _, array in arrays(NEST):
-    setattr(ColonyState, array.view, of_nests(array))
-
-
-def _food_numbers(task: Task) -> np.ndarray:
-    """Return the settings of the kinds of food, int32 (FoodRow, kinds)."""
-    kinds = task.foods.values()
-    numbers = np.zeros((len(FoodRow), max(1, len(kinds))), np.int32)
-    for k, food in enumerate(kinds):
-        grows = -1 if food.regrowth is None else food.regrowth
-        numbers[:, k] = food.pick_up, food.deliver, food.loads, grows
-    return numbers
-
-
-def _caste_numbers(task: Task) -> np.ndarray:
-    """Return the numbers of the castes, float64 (rows, castes); see `CasteRow`."""
-    of_castes = numbers_of_castes(used_by(task)).values()
-    return np.array(
-        [[of(task, caste) for caste in task.castes.values()] for of in of_castes], float
-    )
-
-
-def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -> tuple[World, ...]:
-    """Return one world per seed; AntsError if their number is wrong or their ranges differ."""
-    given = entries_of(world) or [world] * n_seeds
-    worlds = tuple(arguments.checked_world(w, learns, "a colony", SUPPORTS) for w in given)
-    if len(worlds) != n_seeds:
-        raise AntsError(
-            f"there are {len(worlds)} worlds for {n_seeds} seeds; give one world per seed."
-        )
-    arguments.check_ranges(worlds)
-    return worlds
+for array in (*COLUMNS.values(), *(array for _, array in arrays(NEST))):
+    if array.view:
+        setattr(ColonyState, array.view, _view_of(array))

@@ -13,8 +13,9 @@ import numpy as np
 
 from taichi_ants import arguments, runtime
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, WorldRow
-from taichi_ants.engines.colony.state import ALL, ColonyState, Which, checked_worlds
+from taichi_ants.engines.colony.state import ALL, ColonyState, Which
 from taichi_ants.errors import AntsError, as_array, checked_whole, count, entries_of, shown
+from taichi_ants.grid.randomness import words_of
 from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
@@ -47,87 +48,12 @@ class ThreadChoice:
         return ticks, best
 
 
-class Stepper:
-    """The launches of the kernels of one colony."""
-
-    def __init__(self) -> None:
-        self._launches: dict[str, Any] = {}  # prepared kernels, by name
-        self._piece = 1  # a number of ticks that takes less than _PIECE_SECONDS
-        self.threads = ThreadChoice()
-
-    def pieces(self, state: ColonyState, n: int) -> Iterator[None]:
-        """Yield after each short launch until n ticks are done; launches cannot be interrupted."""
-        end = state.ticks + n
-        while state.ticks < end:
-            piece = min(self._piece, end - state.ticks)
-            began = time.perf_counter()
-            self.advance(state, piece)
-            if piece == self._piece:
-                pace = (time.perf_counter() - began) / piece
-                self._piece = max(1, min(2 * piece, int(_PIECE_SECONDS / pace)))
-            yield
-
-    def advance(self, state: ColonyState, n: int) -> None:
-        """Advance the colony by n ticks."""
-        end = state.ticks + n
-        if state.schedule == "by_world":
-            n_worlds = len(state.seeds)
-            threads = threads_for(n_worlds)
-            self._launch_ticks(state, n, parts=threads * -(-n_worlds // threads), threads=threads)
-            return
-        interval = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
-        interval = max(_FEWEST_TICKS, min(_MOST_TICKS, interval))
-        most = min(runtime.start().threads, runtime.available_threads(), state.chunks)
-        while state.ticks < end:
-            if state.ticks % interval == 0:
-                state.sort_ants()
-            piece = min(end - state.ticks, interval - state.ticks % interval)
-            piece, threads = self.threads.plan(piece, most)
-            compiled, began = "ticks" in self._launches, time.perf_counter()
-            self._launch_ticks(state, piece, threads)
-            if compiled:
-                seconds = time.perf_counter() - began
-                self.threads.seconds_per_tick[threads] = seconds / piece
-
-    def launch(self, state: ColonyState, name: str) -> None:
-        """Launch a kernel by name: "ticks", or what ants do once, a function of `learning`."""
-        # The caller may have reset Taichi, or forked the process.
-        runtime.check_on_cpu(runtime.start(), "colonies run")
-        if name not in self._launches:
-            from taichi_ants.engines.colony import kernels, learning
-            from taichi_ants.engines.launch import Launch
-
-            variant = kernels.variant(state.model)
-            kernel_of = partial(kernels.ticks, variant, state.schedule == "by_chunk")
-            if name != "ticks":
-                kernel_of = partial(kernels.once, variant, getattr(learning, name))
-            self._launches[name] = Launch(kernel_of)
-        self._launches[name]({**kernel_numbers(state), **state.arrays})
-
-    def _launch_ticks(self, state: ColonyState, n: int, parts: int, threads: int = 1) -> None:
-        """Advance by n ticks in one launch, and a second one if the first gave up at a barrier."""
-        orders, barrier = state.arrays["orders"], state.arrays["barrier"]
-        orders[: Order.PASSED], barrier[:] = (n, parts, threads, 0, _SPINS), 0
-        try:
-            self.launch(state, "ticks")
-        finally:  # Ctrl-C during a launch raises an error after it
-            if (opened := int(barrier[Barrier.OPENED])) < 0:
-                orders[[Order.PARTS, Order.FIRST]] = 1, opened - GAVE_UP + 1
-                barrier[:] = 0
-                self.launch(state, "ticks")
-
-
-def threads_for(n_worlds: int) -> int:
-    """Return the number of threads among which worlds are dealt, see `Order.THREADS`."""
-    return min(runtime.start().threads, n_worlds)
-
-
 class TickingColony(ColonyState):
     """A colony whose ants observe, act and learn; `Colony` adds runs of whole episodes."""
 
-    @cached_property
-    def _stepper(self) -> Stepper:
-        return Stepper()
+    _piece = 1  # a number of ticks that takes less than _PIECE_SECONDS
+    _launches = cached_property[dict[str, Any]](lambda colony: {})  # prepared kernels, by name
+    _choice = cached_property(lambda colony: ThreadChoice())
 
     def begin_episode(
         self, length: int | None = None, world: World | Sequence[World] | None = None
@@ -141,17 +67,15 @@ class TickingColony(ColonyState):
         Raises:
             AntsError: A world is not allowed.
         """
-        others = None if world is None else checked_worlds(world, len(self.seeds), self.learns)
-        length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
-        if others is not None:
-            fresh = copy.copy(self)  # the worlds may have too little room
+        fresh = copy.copy(self)
+        fresh.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
+        if world is not None:  # which may have too little room
             fresh.arrays = {**self.arrays}
-            fresh.lay_out(others)
+            fresh.lay_out(self.checked_worlds(world))
         self.ready[:] = False  # also after Ctrl-C before the end
-        if others is not None:
-            self.count_deliveries()
-            vars(self).update(vars(fresh))
-        self.length, self.ticks = length, 0
+        self.count_deliveries()
+        vars(self).update(vars(fresh))
+        self.ticks = 0
         self._start()
 
     def _start(self, which: Which = ALL) -> None:
@@ -162,8 +86,15 @@ class TickingColony(ColonyState):
         self.ready[which] = False
         self.count_deliveries(which)
         self.set_learning_rate(self.learning_rate)
-        self.reset(which)
-        self._stepper.launch(self, "begin")
+        self.set_to_start(which)
+        stale = np.zeros_like(self.changed)
+        stale[which] = self.changed[which]
+        if stale.any():
+            self.copy_worlds(self.ground_constants(), stale)
+            self.changed[stale] = False
+        self.copy_worlds({"streams": self.arrays["first_streams"]}, which)
+        self.arrays["episodes"][which] += 1
+        self._launch("begin")
         self.ready[which] = True
 
     def reset_worlds(self, which: np.ndarray, seeds: Sequence[int] | None = None) -> None:
@@ -181,24 +112,26 @@ class TickingColony(ColonyState):
         if seeds is None:
             self.keep_streams(which)
         else:
-            listed, n = entries_of(seeds) or [], int(np.count_nonzero(which))
+            listed, (places,) = entries_of(seeds) or [], np.nonzero(which)
             checked = [seed for one in listed for seed in arguments.checked_seeds(one)]
-            if len(checked) != n:
-                raise AntsError(f"seeds is {shown(seeds)}; give a list of {count(n, 'seed')}.")
+            if len(checked) != len(places):
+                wanted = count(len(places), "seed")
+                raise AntsError(f"seeds is {shown(seeds)}; give a list of {wanted}.")
             self.ready[which] = False
-            self.reseed(which, checked)
+            changed = dict(zip(places.tolist(), checked, strict=True))
+            self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
+            self.arrays["seeds"][:] = words_of(self.seeds)
+            self.read_start(self.n_food_sources)
+            self.copy_worlds(self.seeded(), which)
         self._start(which)
 
-    def observe(self, worlds: Sequence[int] | None = None) -> None:
-        """Let the ants of some or all worlds observe again, after interventions in these worlds."""
-        if self.episode < 0:
-            self.check_begun()
+    def observe(self, worlds: Sequence[int]) -> None:
+        """Let the ants of some worlds observe again, after interventions in these worlds."""
         row = self.arrays["worlds"][WorldRow.RUNNING]
         running = row.copy()
-        if worlds is not None:
-            row[np.setdiff1d(np.arange(len(row)), worlds)] = 0  # ants that misread draw numbers
+        row[np.setdiff1d(np.arange(len(row)), worlds)] = 0  # ants that misread draw numbers
         try:
-            self._stepper.launch(self, "see_interventions")
+            self._launch("see_interventions")
         finally:
             row[:] = running
 
@@ -210,7 +143,7 @@ class TickingColony(ColonyState):
                 "training is None, so ants do not choose actions; call act with the actions of "
                 "each tick instead."
             )
-        for _ in self._stepper.pieces(self, checked_whole("n", n)):
+        for _ in self.pieces(checked_whole("n", n)):
             pass
 
     def act(self, actions: np.ndarray) -> None:
@@ -231,7 +164,7 @@ class TickingColony(ColonyState):
         if given.min() < 0 or given.max() > most:
             given = as_array("actions", np.where(self.living, given, 0), "iu", shape, 0, most)
         self.actions[:] = given
-        self._stepper.advance(self, 1)
+        self._advance(1)
 
     def end_episode(self) -> None:
         """End the episode: save random streams for the next one, and decay epsilon and the rate."""
@@ -241,9 +174,72 @@ class TickingColony(ColonyState):
         learning_rate = self.training.next_learning_rate(self.learning_rate)
         self.epsilon, self.learning_rate = epsilon, learning_rate
 
+    # Launches
+
+    def pieces(self, n: int) -> Iterator[None]:
+        """Yield after each short launch until n ticks are done; launches cannot be interrupted."""
+        end = self.ticks + n
+        while self.ticks < end:
+            piece = min(self._piece, end - self.ticks)
+            began = time.perf_counter()
+            self._advance(piece)
+            if piece == self._piece:
+                pace = (time.perf_counter() - began) / piece
+                self._piece = max(1, min(2 * piece, int(_PIECE_SECONDS / pace)))
+            yield
+
+    def _advance(self, n: int) -> None:
+        """Advance the colony by n ticks."""
+        end = self.ticks + n
+        n_worlds, running = len(self.seeds), runtime.start().threads
+        if self.schedule == "by_world":
+            threads = min(running, n_worlds)
+            self._launch_ticks(n, parts=threads * -(-n_worlds // threads), threads=threads)
+            return
+        interval = _STEPS_BETWEEN_SORTS // (n_worlds * self.capacity)
+        interval = max(_FEWEST_TICKS, min(_MOST_TICKS, interval))
+        most = min(running, runtime.available_threads(), self.chunks)
+        while self.ticks < end:
+            if self.ticks % interval == 0:
+                self.sort_ants()
+            piece = min(end - self.ticks, interval - self.ticks % interval)
+            piece, threads = self._choice.plan(piece, most)
+            compiled, began = "ticks" in self._launches, time.perf_counter()
+            self._launch_ticks(piece, threads)
+            if compiled:
+                seconds = time.perf_counter() - began
+                self._choice.seconds_per_tick[threads] = seconds / piece
+
+    def _launch(self, name: str) -> None:
+        """Launch a kernel by name: "ticks", or what ants do once, a function of `learning`."""
+        # The caller may have reset Taichi, or forked the process.
+        runtime.check_on_cpu(runtime.start(), "colonies run")
+        if name not in self._launches:
+            from taichi_ants.engines.colony import kernels, learning
+            from taichi_ants.engines.launch import Launch
+
+            variant = kernels.variant(self.model)
+            kernel_of = partial(kernels.ticks, variant, self.schedule == "by_chunk")
+            if name != "ticks":
+                kernel_of = partial(kernels.once, variant, getattr(learning, name))
+            self._launches[name] = Launch(kernel_of)
+        self._launches[name]({**kernel_numbers(self), **self.arrays})
+
+    def _launch_ticks(self, n: int, parts: int, threads: int = 1) -> None:
+        """Advance by n ticks in one launch, and a second one if the first gave up at a barrier."""
+        orders, barrier = self.arrays["orders"], self.arrays["barrier"]
+        orders[: Order.PASSED], barrier[:] = (n, parts, threads, 0, _SPINS), 0
+        try:
+            self._launch("ticks")
+        finally:  # Ctrl-C during a launch raises an error after it
+            if (opened := int(barrier[Barrier.OPENED])) < 0:
+                orders[[Order.PARTS, Order.FIRST]] = 1, opened - GAVE_UP + 1
+                barrier[:] = 0
+                self._launch("ticks")
+
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without Taichi's objects, so that copies and pickles work."""
-        made = "_stepper", "model"
+        made = "_piece", "_launches", "_choice", "model"
         return {name: value for name, value in vars(self).items() if name not in made}
 
 

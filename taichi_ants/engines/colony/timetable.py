@@ -25,17 +25,11 @@ class Timetable:
     """
 
     def __init__(self, colony: TickingColony, protocol: Any, length: int) -> None:
-        self._colony, self._events, self._length = colony, checked_protocol(protocol), length
-        self._at: dict[int, list[tuple[int, ProtocolEvent]]] = {}  # by tick: indices and events
-        for number, event in enumerate(self._events):
+        self._colony = colony
+        self._at: dict[int, list[tuple[int, ProtocolEvent]]] = {}  # by tick: numbers and events
+        for number, event in enumerate(checked_protocol(protocol)):
             for tick in event.times(length):
                 self._at.setdefault(tick, []).append((number, event))
-        self._measures = {
-            event.measure: measures.get(event.measure)
-            for event in self._events
-            if isinstance(event, When)
-        }
-        for event in self._events:
             for intervention in event.interventions:
                 everywhere = isinstance(event, When) and intervention.in_all_worlds
                 if everywhere and len(colony.worlds) > 1:
@@ -54,15 +48,14 @@ class Timetable:
     def __exit__(self, *_: object) -> None:
         colony, (task, training, epsilon, learning_rate) = self._colony, self._before
         if colony.task != task:
-            Interventions(colony, lasting=False).set_task(task)
+            self._interventions.set_task(task)
         colony.training, colony.epsilon = training, epsilon
         if colony.learning_rate != learning_rate:
             colony.set_learning_rate(learning_rate)
 
     def pieces(self, advance: Callable[[Any, int], Iterator[None]], n: int) -> Iterator[None]:
         """Yield when `advance` does, until n ticks are done, with all events on the way."""
-        colony = self._colony
-        end = colony.ticks + n
+        colony, end = self._colony, self._colony.ticks + n
         while colony.ticks < end:
             for number, event in self._at.get(colony.ticks, ()):
                 self._happen(number, event)
@@ -71,13 +64,12 @@ class Timetable:
 
     def _happen(self, number: int, event: ProtocolEvent) -> None:
         """Let an event happen in the worlds that are running, if its condition holds there."""
-        colony = self._colony
-        worlds = colony.running.copy()
+        colony, worlds = self._colony, self._colony.running
         if isinstance(event, When):
             done = self._done.setdefault(number, np.zeros_like(worlds))
             worlds &= ~(done & event.once)
             for w in np.flatnonzero(worlds):
-                worlds[w] = event.holds(self._measures[event.measure](colony.snapshot(int(w))))
+                worlds[w] = event.holds(measures.get(event.measure)(colony.snapshot(int(w))))
             done |= worlds
         if not worlds.any():
             return

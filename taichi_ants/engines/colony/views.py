@@ -2,131 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from taichi.lang.impl import subscript
 
 from taichi_ants.engines.colony import columns
 from taichi_ants.engines.colony.layout import COLUMNS, NestRow, WorldRow
 from taichi_ants.features import numbers_of_castes
-from taichi_ants.features.feature import NEST
-from taichi_ants.kernel_functions import while_compiling
+from taichi_ants.features.feature import ANT, CASTE, NEST
+from taichi_ants.kernel_functions import Named, while_compiling
 from taichi_ants.task.model import Model
 
-ANT, WORLD, CASTE = "ant", "world", "caste"
+WORLD = "world"
 
 
-class Entry(NamedTuple):
-    """What a name means in a view: an array of kernels, the row in it if any, and its index."""
-
-    array: str
-    per: str
-    row: int | None = None
-
-
-class Names(NamedTuple):
-    """The names that views of a model know: entries of arrays, and numbers of features."""
-
-    entries: Mapping[str, Entry]
-    numbers: Mapping[str, tuple[str, ...]]
-
-
-def names_of(model: Model) -> Names:
-    """Return the names that hooks of the features of a model can read and write."""
+def entries_of(model: Model) -> dict[str, tuple[str, str, int | None]]:
+    """Return what names mean to the hooks of a model: an array, per what, and the row in it."""
     used = model.features
     of_castes = numbers_of_castes(used) if model.n_castes else {}
-    return Names(
-        {
-            **{name: Entry(name, ANT) for name in COLUMNS},
-            "stream": Entry("streams", ANT),
-            "seed": Entry("seeds", WORLD),
-            **{row.name.lower(): Entry("worlds", WORLD, row) for row in WorldRow},
-            **{row.name.lower(): Entry("nests", NEST, row) for row in NestRow},
-            **{name: Entry("castes", CASTE, row) for row, name in enumerate(of_castes)},
-            **{
-                array.name: Entry(array.name, array.per)
-                for feature in used
-                for array in feature.arrays
-            },
-        },
-        {feature.group: feature.numbers for feature in used if feature.numbers},
-    )
+    arrays = [array for feature in used for array in feature.arrays]
+    return {
+        **{name: (name, ANT, None) for name in COLUMNS},
+        "stream": ("streams", ANT, None),
+        "seed": ("seeds", WORLD, None),
+        **{row.name.lower(): ("worlds", WORLD, row) for row in WorldRow},
+        **{row.name.lower(): ("nests", NEST, row) for row in NestRow},
+        **{name: ("castes", CASTE, row) for row, name in enumerate(of_castes)},
+        **{array.name: (array.name, array.per, None) for array in arrays},
+    }
 
 
-class View:
-    """An ant or a nest of a world, while a kernel compiles.
+def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
+    """Return the view of an ant or a nest of a world, while a kernel compiles.
 
     An attribute is an entry of an array, which can be assigned: by the slot of the ant, or by its
     nest, world or caste. `task` has the settings that features declare as numbers, for example
     `task.labour.demand`. Other names are those of the arrays and numbers of kernels.
     """
 
-    _data_oriented = True  # Taichi requires it of objects whose attributes kernels read
+    def index(per: str) -> Any:
+        if per == WORLD:
+            return w
+        if per == ANT:
+            return ant
+        if per == CASTE:
+            return columns.trait(c.caste, ant)
+        number = columns.nest_of(c, v, ant) if nest is None else nest
+        return w * v.n_nests + number
 
-    def __init__(self, c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> None:
-        self._c, self._v, self._w, self._nest, self._ant = c, v, w, nest, ant
+    def group(name: str) -> Named:
+        (numbers,) = [f.numbers for f in v.features if f.group == name and f.numbers]
+        array = getattr(c, f"{name}_numbers")
+        return Named(lambda setting: subscript(None, array, numbers.index(setting)))
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # of Python
-            raise AttributeError(name)
-        c, names = self._c, self._v.names
+    def read(name: str) -> Any:
         if name == "task":
-            return TaskNumbers(c, names.numbers)
-        if name not in names.entries:
+            return Named(group)
+        if name not in v.entries:
             return getattr(c, name)
-        array, per, row = names.entries[name]
-        index = self._index(per)
-        at = (index,) if row is None else (row, index)
+        array, per, row = v.entries[name]
+        at = (index(per),) if row is None else (row, index(per))
         return subscript(None, getattr(c, array), *at)
 
-    def _index(self, per: str) -> Any:
-        c, v = self._c, self._v
-        if per == WORLD:
-            return self._w
-        if per == ANT:
-            return self._ant
-        if per == CASTE:
-            return columns.trait(c.caste, self._ant)
-        nest = columns.nest_of(c, v, self._ant) if self._nest is None else self._nest
-        return self._w * v.n_nests + nest
+    return Named(read)
 
 
-class TaskNumbers:
-    """The groups of settings of a task that hooks read, while a kernel compiles."""
-
-    _data_oriented = True
-
-    def __init__(self, c: Any, names: Mapping[str, tuple[str, ...]]) -> None:
-        self._c, self._names = c, names
-
-    def __getattr__(self, group: str) -> Any:
-        if group not in self._names:
-            raise AttributeError(group)
-        return Numbers(getattr(self._c, f"{group}_numbers"), self._names[group])
-
-
-class Numbers:
-    """The numbers of a group of settings, while a kernel compiles."""
-
-    _data_oriented = True
-
-    def __init__(self, array: Any, names: tuple[str, ...]) -> None:
-        self._array, self._names = array, names
-
-    def __getattr__(self, name: str) -> Any:
-        if name not in self._names:
-            raise AttributeError(name)
-        return subscript(None, self._array, self._names.index(name))
-
-
-@while_compiling
-def ant_view(c: Any, v: Any, w: Any, ant: Any) -> View:
-    """Return the view of an ant."""
-    return View(c, v, w, ant=ant)
-
-
-@while_compiling
-def nest_view(c: Any, v: Any, w: Any, nest: Any) -> View:
-    """Return the view of a nest."""
-    return View(c, v, w, nest=nest)
+ant_view = while_compiling(lambda c, v, w, ant: _view(c, v, w, ant=ant))
+nest_view = while_compiling(lambda c, v, w, nest: _view(c, v, w, nest=nest))

@@ -12,7 +12,7 @@ from taichi_ants.engines.views import encode_function, fill_codes, view_type
 from taichi_ants.features import hooks_at, used_by
 from taichi_ants.features.feature import Feature
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.kernel_functions import while_compiling
+from taichi_ants.kernel_functions import Named, while_compiling
 from taichi_ants.task import Task
 from taichi_ants.task.constants import FOOD, FORWARD, LEFT, PICK_UP, QUEEN, RIGHT
 from taichi_ants.task.events import Event, Reason
@@ -66,25 +66,13 @@ class Rules(NamedTuple):
         return cls(task.sees, deposit, half, used_by(task), softly)
 
 
-class View:
-    """A lone ant while a kernel compiles, through which hooks of features read it by name.
+@while_compiling
+def ant_view(a: Any, ant: Any) -> Named:
+    """Return the view of a lone ant, through which hooks of features read it by name.
 
     Other names are those of the arrays and numbers of kernels.
     """
-
-    _data_oriented = True  # Taichi requires it of objects whose attributes kernels read
-
-    def __init__(self, a: Any, ant: Any) -> None:
-        self._a, self._ant = a, ant
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._ant if name in Ant.members else self._a, name)
-
-
-@while_compiling
-def ant_view(a: Any, ant: Any) -> View:
-    """Return the view of an ant."""
-    return View(a, ant)
+    return Named(lambda name: getattr(ant if name in Ant.members else a, name))
 
 
 @ti.func

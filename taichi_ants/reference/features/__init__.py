@@ -17,12 +17,16 @@ from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Task
 
 # In the order of the features, which is the order of random draws.
-TWINS = {feature.group: import_module(f"{__name__}.{feature.group}") for feature in FEATURES}
+TWINS = {
+    feature.group: import_module(f"{__name__}.{feature.group}")
+    for feature in FEATURES
+    if feature.hooks
+}
 
 
 def hooks(task: Task, point: str) -> list[Callable[..., Any]]:
     """Return the functions of the features that a task uses at a point."""
-    used = dict.fromkeys(TWINS[feature.group] for feature in used_by(task))
+    used = dict.fromkeys(TWINS[one.group] for one in used_by(task) if one.group in TWINS)
     return [getattr(twin, point) for twin in used if hasattr(twin, point)]
 
 

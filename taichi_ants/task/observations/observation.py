@@ -97,8 +97,7 @@ def of_codes(
     encode: Callable[[Any], int],
     names: tuple[str, str] = CELL_LETTERS,
     cells: tuple[int, ...] = AHEAD,
-    summary: str = "",
-    letters: str = "",
+    **more: Any,
 ) -> Observation:
     """Return an observation whose state is the load, then a code of each cell, as digits.
 
@@ -106,7 +105,7 @@ def of_codes(
     """
     base, n, name = len(names[0]), len(cells), encode.__name__
     name_of, shape = name_of_codes(n, *names), (2, *[base] * n)
-    return Observation(name, 2 * base**n, encode, cells, name_of, summary, letters, shape)
+    return Observation(name, 2 * base**n, encode, cells, name_of, shape=shape, **more)
 
 
 # The package's `__init__` adds the built-in ones.
