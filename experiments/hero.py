@@ -45,11 +45,7 @@ _LEGS = [
 ]
 BODY = (
     *_LEGS,
-    (0, -0.78, 0.34),
-    (0, -0.56, 0.37),
-    (0, -0.2, 0.18),
-    (0, 0.05, 0.21),
-    (0, 0.48, 0.29),
+    *((0, -0.78, 0.34), (0, -0.56, 0.37), (0, -0.2, 0.18), (0, 0.05, 0.21), (0, 0.48, 0.29)),
 )
 RADIUS = 34  # of the grid, a hexagon of cells that is larger than the picture
 _REACH = range(1 - RADIUS, RADIUS)
@@ -179,12 +175,10 @@ def run(seeds: list[int], after: int = 0, keep: bool = False) -> Course:
         course.deliveries.append(course.deliveries[-1] + delivers.sum(axis=1))
         lately = course.deliveries[-1] - course.deliveries[max(0, tick - WINDOW)]
         came += (delivers & (picked > (course.wall + STROKE)[:, None])).sum(axis=1)
-        facts = (
-            (course.first, lately > 0),
-            (course.lanes, lately >= LANES),
-            (course.detour, came >= DETOUR),
-        )
-        for when, happened in facts:
+        times = course.first, course.lanes, course.detour
+        for when, happened in zip(
+            times, (lately > 0, lately >= LANES, came >= DETOUR), strict=True
+        ):
             when[(when < 0) & happened] = tick
     if keep:
         course.snapshots.append(colony.snapshot())
@@ -330,10 +324,9 @@ def film(course: Course, look: Look) -> Iterator[np.ndarray]:
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
-    parser.add_argument(
-        "--folder", type=Path, default=ROOT / "renders", help="write both films here"
-    )
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="choose among so many colonies")
+    add, renders = parser.add_argument, ROOT / "renders"
+    add("--folder", type=Path, default=renders, help="write both films here")
+    add("--seeds", type=int, default=SEEDS, help="choose among so many colonies")
     return parser.parse_args(arguments)
 
 

@@ -53,9 +53,8 @@ def shares(model, long, opens, seeds):
     """Return the share of the last crossings that are on the short branch, for each of n seeds."""
     found = np.empty(seeds)
     # Interventions, which open the short branch late, need a colony with a single world.
-    several = (
-        [[seed] for seed in range(seeds)] if opens else [range(0, seeds, 2), range(1, seeds, 2)]
-    )
+    pairs = [range(side, seeds, 2) for side in (0, 1)]
+    several = [[seed] for seed in range(seeds)] if opens else pairs
     for some in filter(len, several):
         bridge = {"short": SHORT, "long": long, "mirrored": bool(some[0] % 2)}
         world = double_bridge(**bridge)

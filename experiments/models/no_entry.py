@@ -128,10 +128,7 @@ def task(mark: Field, half_life: float) -> Task:
 
 
 def deliveries_over_time(
-    seeds: list[int],
-    model: str,
-    half_life: float = HALF_LIVES[0],
-    ants: int = ANTS,
+    seeds: list[int], model: str, half_life: float = HALF_LIVES[0], ants: int = ANTS
 ) -> np.ndarray:
     """Return the deliveries so far, every STEP ticks, (seeds, times)."""
     worlds, rules_of_all = [decision_tree()] * len(seeds), task(MARKS[model], half_life)
