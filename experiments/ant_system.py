@@ -16,6 +16,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     import numpy as np
     import taichi as ti
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import dijkstra
 
     from taichi_ants import AntsError, World, runtime, worlds
     from taichi_ants.arguments import checked_world
@@ -150,16 +152,13 @@ def open_cells(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, i
     is_food = (ground[cells] == FOOD).astype(np.int32)
     start = int(number[world.grid.index(world.queen)])
 
-    seen = np.zeros(len(cells) + 1, bool)  # the last element is for the missing neighbour, -1
-    seen[-1] = True
-    layer, steps = np.array([start]), 0
-    while not is_food[layer].any():
-        seen[layer] = True
-        around = np.unique(neighbours[layer])
-        layer, steps = around[~seen[around]], steps + 1
-        if not len(layer):
-            raise AntsError("no food can be reached from the queen; use a world with a free path.")
-    return cells, neighbours, is_food, start, steps
+    ways = np.nonzero(neighbours >= 0)
+    edges = ways[0], neighbours[ways]
+    graph = coo_array((np.ones(len(ways[0])), edges), shape=(len(cells), len(cells)))
+    steps = dijkstra(graph.tocsr(), indices=start, unweighted=True)[is_food == 1].min()
+    if np.isinf(steps):
+        raise AntsError("no food can be reached from the queen; use a world with a free path.")
+    return cells, neighbours, is_food, start, int(steps)
 
 
 @dataclass(frozen=True)
@@ -179,8 +178,12 @@ class Search:
     @property
     def found(self) -> np.ndarray:
         """int64 (colonies,): the first iteration, from 1, with a shortest tour; 0 if none has."""
-        hits = self.best == self.shortest
-        return np.where(hits.any(axis=1), hits.argmax(axis=1) + 1, 0)
+        return first_true(self.best == self.shortest)
+
+
+def first_true(hits: np.ndarray) -> np.ndarray:
+    """Return the first true column of each row, from 1; 0 if there is none."""
+    return np.pad(hits, ((0, 0), (1, 0))).argmax(axis=1)
 
 
 @checked_arguments

@@ -87,10 +87,9 @@ def point(design: Design, episodes: int, ticks: int) -> ColonyPoint:
 
 @dataclass(frozen=True)
 class Plan:
-    """The study, the point of each design, and the ticks of an evaluation."""
+    """The study, with a point for each of `DESIGNS`, and the ticks of an evaluation."""
 
     study: Study
-    points: Mapping[Design, ColonyPoint]
     ticks: int
 
 
@@ -98,10 +97,9 @@ def plan(options: Mapping[str, Any]) -> Plan:
     """Return the study."""
     seeds = tuple(range(options["seed"], options["seed"] + options["seeds"]))
     ticks, lengths = options["evaluation_ticks"], (options["episodes"], options["ticks"])
-    points = {design: point(design, *lengths) for design in DESIGNS}
-    followed = partial(crossed, {one: design for design, one in points.items()}, ticks)
-    array = f"crossings_{ticks}"
-    return Plan(Study(tuple(points.values()), seeds, (array,), followed), points, ticks)
+    designs = {point(design, *lengths): design for design in DESIGNS}
+    followed = partial(crossed, designs, ticks)
+    return Plan(Study(tuple(designs), seeds, (f"crossings_{ticks}",), followed), ticks)
 
 
 def crossed(
@@ -139,7 +137,7 @@ def tables(plan: Plan, results: Results) -> str:
             name: np.moveaxis(arrays[f"crossings_{plan.ticks}.{BRIDGES.index(name)}"][row], 0, -1)
             for name in bridges(design)
         }
-        for row, design in enumerate(plan.points)
+        for row, design in enumerate(DESIGNS)
     }
     table = shown.rows(found, plan.study.seeds, plan.ticks)
     files.write_csv(results.folder / "shares.csv", table, list(table[0]))

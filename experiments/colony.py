@@ -28,7 +28,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import colony_findings as study
     import numpy as np
     from colony_figures import draw_all
-    from colony_findings import JOINT, WORLD_KINDS, WORLDS, Condition, Results
+    from colony_findings import JOINT, WORLD_KINDS, WORLDS, Condition
     from colony_limits import limits_of
 
     from taichi_ants import AntsError, Colony, TrainingConfig, commands, files, learners, worlds
@@ -297,11 +297,11 @@ def tables(plan: Plan, runs: Runs) -> str:
     arrays = runs.read(runs.study.keys, arrays=COLONY)
     of_points = {p: {n: a[row] for n, a in arrays.items()} for p, row in place_of.items()}
     values = with_bounds(conditions, of_points, seeds)
-    results = Results.of(values)
+    rows, judged = study.condition_rows(values), study.judge_all(values)
     for name, table in (
         ("seeds.csv", study.rows_of_seeds(values, seeds)),
-        ("conditions.csv", [one.columns() for one in results.rows]),
-        ("differences.csv", study.difference_rows(results.judged)),
+        ("conditions.csv", [one.columns() for one in rows]),
+        ("differences.csv", study.difference_rows(judged)),
     ):
         files.write_csv(folder / name, table, list(table[0]))
     policies = {}
@@ -322,19 +322,18 @@ def tables(plan: Plan, runs: Runs) -> str:
             save_policy(folder / "policies" / name, q_values[run], metadata, point.task.observation)
     parts: dict[str, Any] = {"drawings": [], "players": []}
     if runs.figures:
-        style.save_all(draw_all(results.rows), folder / "figures")
-        parts["drawings"] = drawings(draw_all(results.rows))
+        style.save_all(draw_all(rows), folder / "figures")
+        parts["drawings"] = drawings(draw_all(rows))
         parts["players"] = at_work(conditions, policies, seeds[0])
     facts = page.setting_facts(settings_of(runs.study.points, seeds))
     parts["facts"] = {**facts, **page.made_facts(runs.made)}
     links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
-    files.write_text(folder / PAGE, colony_page(results, **parts, files=links))
-    return plain_text(study.on_one_screen(*results), width=79)
+    files.write_text(folder / PAGE, colony_page(rows, judged, **parts, files=links))
+    return plain_text(study.on_one_screen(rows, judged), width=79)
 
 
-def colony_page(results: Results, **parts: Any) -> str:
+def colony_page(rows: Sequence[study.ConditionRow], judged: study.Judged, **parts: Any) -> str:
     """Return the page as HTML; `parts` are drawings, players, facts and files."""
-    rows, judged = results
     world_kinds = {row.condition.world_kind for row in rows}
     seeds = study.seeds_in_words(rows[0].seeds)
     return page.fill(
@@ -345,7 +344,7 @@ def colony_page(results: Results, **parts: Any) -> str:
         seeds=seeds,
         epsilon=f"{study.EVALUATION_EPSILON:g}",
         worlds=[words for name, words in WORLD_KINDS.items() if name in world_kinds],
-        headlines=study.headlines(*results),
+        headlines=study.headlines(rows, judged),
         findings=_statements(judged),
         glance=study.glance(rows),
         tables=study.means(rows),

@@ -374,15 +374,3 @@ def of_largest(findings: Mapping[Sizes, Finding]) -> Finding:
     """Return the finding on the largest colony; of several, that with the strongest objection."""
     largest = max(ants for ants, _ in findings)
     return weakest([one for (ants, _), one in findings.items() if ants == largest])
-
-
-class Results(NamedTuple):
-    """The rows of all conditions, and the findings."""
-
-    rows: Sequence[ConditionRow]
-    judged: Judged
-
-    @classmethod
-    def of(cls, measured: Measured) -> Results:
-        """Return the results of all measures."""
-        return cls(condition_rows(measured), judge_all(measured))

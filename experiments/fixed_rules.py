@@ -20,7 +20,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from dataclasses import replace
     from itertools import product
     from pathlib import Path
-    from typing import TYPE_CHECKING
+    from typing import TYPE_CHECKING, Any
 
     import numpy as np
     from colony import LARGE_SIZE, task_in, world_of
@@ -154,16 +154,10 @@ def evaluate(
     settings: argparse.Namespace, places: Sequence[World], rules: Task, epsilon: float, ants: int
 ) -> ColonyEpisodes:
     """Return four episodes of 1000 ticks in each world."""
-    colony = Colony(
-        places,
-        rules,
-        TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0, min_epsilon=epsilon),
-        [seed + EVALUATION_SEEDS for seed in range(settings.seeds)],
-        ants,
-        sharing="frozen",
-        q_values=trail_follower(rules.observation),
-        threads=settings.threads,
-    )
+    seeds = [seed + EVALUATION_SEEDS for seed in range(settings.seeds)]
+    follow: dict[str, Any] = {"sharing": "frozen", "q_values": trail_follower(rules.observation)}
+    calm = TrainingConfig.frozen(epsilon)
+    colony = Colony(places, rules, calm, seeds, ants, **follow, threads=settings.threads)
     return colony.run(EPISODES, TICKS)
 
 

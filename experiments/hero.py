@@ -25,7 +25,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from scipy.ndimage import gaussian_filter
 
     from taichi_ants import Colony, Interventions, TrainingConfig, World, files, task
-    from taichi_ants.grid.hexgrid import AxialGrid, centre_of
+    from taichi_ants.grid.hexgrid import AxialGrid, centre_of, cube
     from taichi_ants.interventions import Place
     from taichi_ants.records import Snapshot
     from taichi_ants.rendering import text
@@ -45,18 +45,14 @@ _LEGS = [
 ]
 BODY = (
     *_LEGS,
-    (0, -0.78, 0.34),
-    (0, -0.56, 0.37),
-    (0, -0.2, 0.18),
-    (0, 0.05, 0.21),
-    (0, 0.48, 0.29),
+    *((0, -0.78, 0.34), (0, -0.56, 0.37), (0, -0.2, 0.18), (0, 0.05, 0.21), (0, 0.48, 0.29)),
 )
-Cells = set[tuple[int, int]]  # axial coordinates
 RADIUS = 34  # of the grid, a hexagon of cells that is larger than the picture
 _REACH = range(1 - RADIUS, RADIUS)
-ALL_CELLS = [(q, r) for q in _REACH for r in _REACH if abs(q - r) < RADIUS]
+CELLS = cube([(q, r) for q in _REACH for r in _REACH if abs(q - r) < RADIUS])
 SEEDS, ANTS = 100, 64
 SIZE, BAND, HEXAGON = (960, 600), 92, 11.0  # pixels: the picture, the text above the world, a cell
+CENTRES = centre_of(CELLS, HEXAGON)
 ROUND, FADE, QUALITY = 14, 0.4, 54  # radius of corners, seconds, of 100
 FPS, DRAWN_AT = 20, 2  # frames per second; pictures are drawn twice as large, for smooth edges
 
@@ -92,28 +88,19 @@ LOOKS = {
 }
 
 
-def cube(q: int, r: int) -> tuple[int, int, int]:
-    """Return cube coordinates of a cell in normal form."""
-    low = min(q, r, 0)
-    return q - low, r - low, -low
-
-
-def within(*circles: tuple[float, float, float]) -> Cells:
-    """Return the cells, from far outside the picture, whose centres lie in one of the circles."""
-    x, y = np.moveaxis(centre_of([cube(*one) for one in ALL_CELLS], HEXAGON), -1, 0)
-    inside = np.any([np.hypot(x - a, y - b) <= radius for a, b, radius in circles], axis=0)
-    return {one for one, inner in zip(ALL_CELLS, inside, strict=True) if inner}
+def within(*circles: tuple[float, float, float]) -> np.ndarray:
+    """Return which of `CELLS`, some far outside the picture, have their centres in a circle."""
+    away = [(np.hypot(*(CENTRES - (x, y)).T), radius) for x, y, radius in circles]
+    return np.any([distance <= radius for distance, radius in away], axis=0)
 
 
 def meadow() -> World:
     """Return a world as wide as the picture, with one nest, one pile of food and some rocks."""
     half = np.array([SIZE[0], SIZE[1] - BAND]) / 2 - HEXAGON
-    outside = {c for c in ALL_CELLS if np.any(np.abs(centre_of(cube(*c), HEXAGON)) > half)}
-    foods = within(PILE) - outside
-    rocks = (within(*ROCKS) | outside) - foods
-    return World(
-        (RADIUS,) * 3, cube(*QUEEN), *([cube(*c) for c in sorted(each)] for each in (foods, rocks))
-    )
+    outside = (np.abs(CENTRES) > half).any(axis=1)
+    foods = within(PILE) & ~outside
+    rocks = (within(*ROCKS) | outside) & ~foods
+    return World((RADIUS,) * 3, cube(QUEEN), CELLS[foods], CELLS[rocks])
 
 
 def colony_of(seeds: list[int]) -> Colony:
@@ -132,18 +119,14 @@ def colony_of(seeds: list[int]) -> Colony:
     return colony
 
 
-def stroke() -> list[list[tuple[int, int, int]]]:
+def stroke() -> list[list[list[int]]]:
     """Return the cells of the wall, three cells thick, by the tick in which each is drawn."""
-    (q0, r0), (q1, r1) = WALL
-    path = np.linspace((q0, r0), (q1, r1), STROKE)
-    ends = [(round(q), round(r)) for q, r in path]
-    seen: Cells = set()
-    parts = []
-    for q, r in ends:
-        middle = centre_of(cube(q, r), HEXAGON)
-        new = within((*middle, 1.9 * HEXAGON)) - seen
+    seen, parts = np.zeros(len(CELLS), bool), []
+    for place in np.linspace(*WALL, STROKE):
+        middle = centre_of(cube(place.round()), HEXAGON)
+        new = within((*middle, 1.9 * HEXAGON)) & ~seen
         seen |= new
-        parts.append([cube(*each) for each in sorted(new)])
+        parts.append(CELLS[new].tolist())
     return parts
 
 
@@ -192,12 +175,10 @@ def run(seeds: list[int], after: int = 0, keep: bool = False) -> Course:
         course.deliveries.append(course.deliveries[-1] + delivers.sum(axis=1))
         lately = course.deliveries[-1] - course.deliveries[max(0, tick - WINDOW)]
         came += (delivers & (picked > (course.wall + STROKE)[:, None])).sum(axis=1)
-        facts = (
-            (course.first, lately > 0),
-            (course.lanes, lately >= LANES),
-            (course.detour, came >= DETOUR),
-        )
-        for when, happened in facts:
+        times = course.first, course.lanes, course.detour
+        for when, happened in zip(
+            times, (lately > 0, lately >= LANES, came >= DETOUR), strict=True
+        ):
             when[(when < 0) & happened] = tick
     if keep:
         course.snapshots.append(colony.snapshot())
@@ -221,7 +202,7 @@ class Painter:
         self.cell = grid.index(cells_at(x / HEXAGON, y / HEXAGON))  # of each pixel
         corner = np.array([width, height])[:, None, None] / 2 - ROUND - np.abs(np.stack([x, y]))
         self.panel = np.clip(ROUND + 0.5 - np.hypot(*np.minimum(corner, 0)), 0, 1)[..., None]
-        self.rocks = grid.index([cube(*one) for one in sorted(within(*ROCKS))])
+        self.rocks = grid.index(CELLS[within(*ROCKS)])
         self.start: np.ndarray | None = None  # the ground at the start
         self.rock: tuple[bytes, np.ndarray] = (b"", np.zeros(0))  # of a ground, and its picture
 
@@ -300,7 +281,7 @@ def cells_at(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return (near - near.min(axis=-1, keepdims=True)).astype(np.int64)
 
 
-def film(course: Course, look: Look, step: int = 1) -> Iterator[np.ndarray]:
+def film(course: Course, look: Look) -> Iterator[np.ndarray]:
     """Yield the pictures of a colony, uint8 (height, width, 3)."""
     first, lanes, wall, detour = (
         int(one[0]) for one in (course.first, course.lanes, course.wall, course.detour)
@@ -317,7 +298,7 @@ def film(course: Course, look: Look, step: int = 1) -> Iterator[np.ndarray]:
     seconds = 0.0, 1.6, 2.5, 3.1, 4.0, 4.8, 6.2, 7.2, 8.0
     ticks = 0, 30, first, lanes, wall, wall + STROKE, detour, end - 20, end
     painter, opening = Painter(look, course.snapshots[0].grid), None
-    for number in range(0, round(FPS * seconds[-1]), step):
+    for number in range(round(FPS * seconds[-1])):
         times = [np.interp(max(0, number - n) / FPS, seconds, ticks) for n in (0, 1)]
         now, before = (min(math.ceil(one), end) for one in times)
         now = max(now, 1)
@@ -343,10 +324,9 @@ def film(course: Course, look: Look, step: int = 1) -> Iterator[np.ndarray]:
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
-    parser.add_argument(
-        "--folder", type=Path, default=ROOT / "renders", help="write both films here"
-    )
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="choose among so many colonies")
+    add, renders = parser.add_argument, ROOT / "renders"
+    add("--folder", type=Path, default=renders, help="write both films here")
+    add("--seeds", type=int, default=SEEDS, help="choose among so many colonies")
     return parser.parse_args(arguments)
 
 

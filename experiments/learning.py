@@ -69,60 +69,50 @@ class Checkpoint:
         return earned.cumsum(axis=0)
 
 
-def learning_checkpoints(
-    world: World,
-    config: TrainingConfig,
-    seed: int,
-    checkpoints: Sequence[int],
-    steps: int = 150,
-    task: Task = render.TASK,
-    epsilon: float = 0.0,
-) -> list[Checkpoint]:
-    """Return rollouts of at most `steps`, one after each given number of training episodes."""
-    found = []
-    for n in checkpoints:
-        table = action_values(world, config, [seed], n, task)[0]
-        episode = Episode(rollout(world, table, seed, 0, steps, task, epsilon), "")
-        behaviour = classify(episode.trace, steps)[0][0]
-        delivered = "delivered" if episode.delivered else ""
-        note = delivered if behaviour in (DELIVERS, OTHER) else BEHAVIOURS[behaviour]
-        found.append(Checkpoint(n, episode, note))
-    return found
+@dataclass(frozen=True)
+class Lessons:
+    """What ants learn, and how they are followed after a number of training episodes."""
 
+    world: World
+    config: TrainingConfig
+    steps: int = 150  # of a rollout, at most
+    task: Task = render.TASK
+    epsilon: float = 0.0
 
-def typical_seed(
-    world: World,
-    config: TrainingConfig,
-    seeds: Sequence[int],
-    checkpoints: Sequence[int],
-    steps: int = 150,
-    task: Task = render.TASK,
-    epsilon: float = 0.0,
-) -> tuple[int, list[int]]:
-    """Return the seed closest to the median run, and how many seeds deliver at each checkpoint.
+    def checkpoints(self, seed: int, after: Sequence[int]) -> list[Checkpoint]:
+        """Return rollouts, one after each given number of training episodes."""
+        found, how = [], (self.steps, self.task, self.epsilon)
+        for n in after:
+            table = self.action_values([seed], n)[0]
+            episode = Episode(rollout(self.world, table, seed, 0, *how), "")
+            behaviour = classify(episode.trace, self.steps)[0][0]
+            delivered = "delivered" if episode.delivered else ""
+            note = delivered if behaviour in (DELIVERS, OTHER) else BEHAVIOURS[behaviour]
+            found.append(Checkpoint(n, episode, note))
+        return found
 
-    The function ranks all seeds by the return and by the steps of their rollouts at each
-    checkpoint; equal values share the mean of their ranks. It chooses the seed whose largest
-    distance from the middle rank is smallest, and the first one on a tie.
-    """
-    distances, deliver = np.zeros(len(seeds)), []
-    for n in checkpoints:
-        tables = action_values(world, config, seeds, n, task)
-        outcome = evaluate(world, tables, 1, seeds, steps, task, epsilon)
-        for values in (outcome.returns[:, 0], outcome.steps[:, 0]):
-            above = np.sign(values[:, None] - values).sum(axis=1)  # 0 at the middle rank
-            distances = np.maximum(distances, np.abs(above) / len(seeds))
-        deliver.append(int((outcome.deliveries[:, 0] > 0).sum()))
-    return int(seeds[distances.argmin()]), deliver
+    def typical_seed(self, seeds: Sequence[int], after: Sequence[int]) -> tuple[int, list[int]]:
+        """Return the seed closest to the median run, and how many deliver at each checkpoint.
 
+        The function ranks all seeds by the return and by the steps of their rollouts at each
+        checkpoint; equal values share the mean of their ranks. It chooses the seed whose largest
+        distance from the middle rank is smallest, and the first one on a tie.
+        """
+        distances, deliver = np.zeros(len(seeds)), []
+        for n in after:
+            tables, how = self.action_values(seeds, n), (self.steps, self.task, self.epsilon)
+            outcome = evaluate(self.world, tables, 1, seeds, *how)
+            for values in (outcome.returns[:, 0], outcome.steps[:, 0]):
+                above = np.sign(values[:, None] - values).sum(axis=1)  # 0 at the middle rank
+                distances = np.maximum(distances, np.abs(above) / len(seeds))
+            deliver.append(int((outcome.deliveries[:, 0] > 0).sum()))
+        return int(seeds[distances.argmin()]), deliver
 
-def action_values(
-    world: World, config: TrainingConfig, seeds: Sequence[int], episodes: int, task: Task
-) -> np.ndarray:
-    """Return action values after a number of training episodes, float32 (seeds, n_states, 5)."""
-    if not episodes:
-        return np.zeros((len(seeds), task.n_states, N_ACTIONS), dtype=np.float32)
-    return train(world, config, seeds, episodes, task=task).q_values[0]
+    def action_values(self, seeds: Sequence[int], episodes: int) -> np.ndarray:
+        """Return action values after training episodes, float32 (seeds, n_states, 5)."""
+        if not episodes:
+            return np.zeros((len(seeds), self.task.n_states, N_ACTIONS), dtype=np.float32)
+        return train(self.world, self.config, seeds, episodes, task=self.task).q_values[0]
 
 
 def learning_frames(
@@ -227,15 +217,15 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def noted_checkpoints(settings: argparse.Namespace, world: World) -> tuple[int, list[Checkpoint]]:
     """Return the seed, and its checkpoints with notes on other seeds."""
-    config, seed = render.training_config(settings), settings.seed
-    limits = settings.max_steps, render.given_task(settings), settings.epsilon
-    among = [""] * len(settings.checkpoints)
+    seed, among = settings.seed, [""] * len(settings.checkpoints)
+    given = settings.max_steps, render.given_task(settings), settings.epsilon
+    lessons = Lessons(world, render.training_config(settings), *given)
     if seed is None:
         seeds = range(settings.seeds)
-        seed, deliver = typical_seed(world, config, seeds, settings.checkpoints, *limits)
+        seed, deliver = lessons.typical_seed(seeds, settings.checkpoints)
         if len(seeds) > 1:
             among = [f"{n} of {len(seeds)} ants deliver{'s' * (n == 1)}" for n in deliver]
-    found = learning_checkpoints(world, config, seed, settings.checkpoints, *limits)
+    found = lessons.checkpoints(seed, settings.checkpoints)
     return seed, [replace(one, among=others) for one, others in zip(found, among, strict=True)]
 
 

@@ -117,7 +117,8 @@ def judging(seeds: range, progress: Callable[[float], None]) -> Table:
     """Return table (b), the rank correlation of estimated and true values, loss and coverage."""
     stages = [train(WORLD, ONLINE, (1000, 1001), n).q_values[0] for n in (1, 3, 10, 100)]
     policies = np.concatenate([[random_policy(), trail_follower()], *stages])
-    true = np.array([_returns(q, 5000, 999, EPSILON).mean() for q in policies])
+    played = (record(WORLD, q, 5000, 999, 600, STILL, EPSILON) for q in policies)
+    true = np.array([data.returns(DISCOUNT).mean() for data in played])
     behaviours = {"random": (None, 0.0), "epsilon 0.5": (stages[-1][0], 0.5)}
     behaviours["epsilon 0.1"] = (stages[-1][0], 0.1)
     rows: list[list[str]] = []
@@ -143,10 +144,6 @@ def judging(seeds: range, progress: Callable[[float], None]) -> Table:
         "effective sample size.",
     )
     return Table("(b) Ranking ten policies before they are tried", columns, rows, notes, 2)
-
-
-def _returns(table: np.ndarray, episodes: int, seed: int, epsilon: float) -> np.ndarray:
-    return record(WORLD, table, episodes, seed, 600, STILL, epsilon).returns(DISCOUNT)
 
 
 def _scores(found: offline.PolicyValues, true: np.ndarray) -> tuple[float, ...]:

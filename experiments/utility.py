@@ -20,7 +20,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     import numpy as np
     import taichi as ti
-    from ant_system import open_cells
+    from ant_system import first_true, open_cells
     from taichi.math import popcnt
 
     from taichi_ants import World, runtime, worlds
@@ -187,11 +187,6 @@ class Foraging:
     def found(self) -> np.ndarray:
         """int64 (colonies,): the first measured tick with a shortest path; 0 if there is none."""
         return EVERY * first_true(self.lengths == self.shortest)
-
-
-def first_true(hits: np.ndarray) -> np.ndarray:
-    """Return the first true column of each row, from 1; 0 if there is none."""
-    return np.pad(hits, ((0, 0), (1, 0))).argmax(axis=1)
 
 
 @checked_arguments

@@ -15,7 +15,7 @@ from taichi_ants.task import Labour, Threshold
 ANTS, TICKS, STEP, RELIEF = 64, 4000, 50, 1
 DEMANDS = (0.25, 0.5, 1.0, 2.0)  # units of stimulus per tick
 WORKERS = {"worker": {"threshold": Threshold("lognormal", value=20, spread=1)}}
-FOLLOW = TrainingConfig("q_learning", 1.0, 1.0, epsilon=0.05, epsilon_decay=1.0)
+FOLLOW = TrainingConfig.frozen(epsilon=0.05)
 
 
 def foraging_over_time(seeds, demand):

@@ -7,31 +7,25 @@ the model "both ways", all ants mark, and ants with food follow the marks of all
 both models. On the late bridge, rock closes the short branch for the first half of the time. Shares
 are of the crossings in the last tenth of the time.
 
-The script prints, for each bridge, the share of colonies with most crossings on the short branch,
-and the share of colonies with at least 80 % of them on one branch. It writes double_bridge.csv,
-with a row for each colony, and double_bridge.png. See docs/models.md.
+The table has, for each bridge, the share of colonies with most crossings on the short branch, and
+the share of colonies with at least 80 % of them on one branch. See docs/models.md.
 """
 
-from __future__ import annotations
+import sys
+from itertools import product
+from pathlib import Path
 
-from taichi_ants.studies.interruption import stoppable
+import model_script
+import numpy as np
 
-with stoppable():  # Ctrl-C also works during these slow imports
-    import argparse
-    import sys
-    from pathlib import Path
+sys.path.append(str(Path(__file__).parents[1]))
+from bridge import crossings
 
-    import numpy as np
-
-    sys.path.append(str(Path(__file__).parents[1]))
-    from bridge import crossings
-
-    from taichi_ants import Colony, Field, files
-    from taichi_ants.analysis import style
-    from taichi_ants.analysis.statistics import bootstrap_interval
-    from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
-    from taichi_ants.task import Choice, Life, Pheromone, Task
-    from taichi_ants.worlds import double_bridge
+from taichi_ants import Colony, Field
+from taichi_ants.analysis import style
+from taichi_ants.studies.command_line import progress_bar
+from taichi_ants.task import Choice, Life, Pheromone, Task
+from taichi_ants.worlds import double_bridge
 
 DEPOSIT, ANTS, TICKS, SHORT, LONG = 100, 60, 6000, 20, 37
 MARKS = {
@@ -55,14 +49,13 @@ MODELS = {
 BRIDGES = {"equal": (SHORT, 0), "short at once": (LONG, 0), "short late": (LONG, TICKS // 2)}
 
 
-def shares(model: Task, long: int, opens: int, seeds: int) -> np.ndarray:
-    """Return the share of the last crossings that are on the short branch, for each seed."""
+def shares(model, long, opens, seeds):
+    """Return the share of the last crossings that are on the short branch, for each of n seeds."""
     found = np.empty(seeds)
     # Interventions, which open the short branch late, need a colony with a single world.
-    several = (
-        [[seed] for seed in range(seeds)] if opens else [range(0, seeds, 2), range(1, seeds, 2)]
-    )
-    for some in several:
+    pairs = [range(side, seeds, 2) for side in (0, 1)]
+    several = [[seed] for seed in range(seeds)] if opens else pairs
+    for some in filter(len, several):
         bridge = {"short": SHORT, "long": long, "mirrored": bool(some[0] % 2)}
         world = double_bridge(**bridge)
         colony = Colony(world, model, None, some, ANTS, sharing="frozen", schedule="by_world")
@@ -72,52 +65,34 @@ def shares(model: Task, long: int, opens: int, seeds: int) -> np.ndarray:
     return found
 
 
-def interval(which: np.ndarray) -> str:
-    """Return the share of true entries in percent, with its 95 % interval."""
-    (low,), (high,) = bootstrap_interval(1.0 * which[None])
-    return f"{100 * which.mean():3.0f} [{100 * low:.0f}, {100 * high:.0f}]".ljust(14)
+def measure(seeds):
+    """Return the shares of all colonies, and in percent whether they chose a branch."""
+    found, numbers, summary = {}, [], []
+    with progress_bar("Colonies on bridges") as progress:
+        for model, bridge in product(MODELS, BRIDGES):
+            every = shares(MODELS[model], *BRIDGES[bridge], len(seeds))
+            found[f"{bridge}, {model}"] = known = every[np.isfinite(every)]
+            numbers += [
+                {"marks": model, "bridge": bridge, "seed": seed, "short_share": share}
+                for seed, share in zip(seeds, every.tolist(), strict=True)
+            ]
+            for share in known.tolist():
+                row = {"marks, bridge": f"{model}, {bridge}", "short (%)": 100 * (share > 0.5)}
+                summary.append({**row, "one side (%)": 100 * (abs(share - 0.5) >= 0.3)})
+            progress(len(found) / (len(MODELS) * len(BRIDGES)))
 
-
-def main(settings: argparse.Namespace) -> None:
-    """Print the table, and write the figure and its numbers."""
-    files.check_writable_file(settings.out / "double_bridge.csv")
-    rows, lines = [], []
-    with style.styled(), progress_bar("Colonies on bridges") as progress:
-        figure = style.new_figure(4.4)
-        panels = figure.subplots(len(MODELS), len(BRIDGES), sharex=True, sharey=True)
-        cases = [(model, bridge) for model in MODELS for bridge in BRIDGES]
-        for number, (axes, (model, bridge)) in enumerate(zip(panels.flat, cases, strict=True)):
-            every = shares(MODELS[model], *BRIDGES[bridge], settings.seeds)
-            rows += [{"marks": model, "bridge": bridge, "seed": seed, "short_share": share}
-                     for seed, share in enumerate(every.tolist())]  # fmt: skip
-            known = every[np.isfinite(every)]
-            lines.append(
-                f"{model:15} {bridge:14} {len(known):8}  {interval(known > 0.5)}  "
-                f"{interval(np.abs(known - 0.5) >= 0.3)}"
-            )
+    def draw(panels):
+        for axes, (case, known) in zip(panels.flat, found.items(), strict=True):
             axes.hist(known, np.linspace(0, 1, 11), color=style.BLUE)
-            axes.set(title=f"{bridge}, {model}")
-            progress((number + 1) / len(cases))
+            axes.set(title=case)
         for axes in panels[-1]:
             axes.set_xlabel("share on the short branch")
-        style.frame(figure, "Double bridge: colonies by their use of the short branch",
-                    f"{settings.seeds} colonies of {ANTS} ants in each panel, last tenth of "
-                    f"{TICKS} ticks.", {})  # fmt: skip
-    print("marks           bridge         colonies  short (%)     one side (%)")
-    print(*lines, sep="\n")
-    columns = ("marks", "bridge", "seed", "short_share")
-    files.write_csv(settings.out / "double_bridge.csv", rows, columns)
-    style.save(figure, settings.out / "double_bridge.png")
 
-
-def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """Return the settings of the command line."""
-    parser = Parser(__doc__)
-    add = parser.add_argument
-    add("--seeds", type=whole_number(2), default=60, metavar="N", help="colonies in each case")
-    add("--out", type=Path, default=Path(), metavar="FOLDER", help="folder for figure and numbers")
-    return parser.parse_args(arguments)
+    title = "Double bridge: colonies by their use of the short branch"
+    caption = f"{len(seeds)} colonies of {ANTS} ants in each panel, last tenth of {TICKS} ticks."
+    panels = len(MODELS), len(BRIDGES)
+    return model_script.Results(numbers, summary, title, draw, caption, panels, height=4.4)
 
 
 if __name__ == "__main__":
-    run_command(lambda: main(parse_arguments()))
+    model_script.run(__file__, __doc__, measure, seeds=60)

@@ -20,7 +20,7 @@ from taichi_ants.task import Choice, Life, Traffic
 
 ANTS, TICKS, STEP = 16, 3000, 100
 STEM, BRANCH = 2, 4  # lengths in cells
-FEAR, AMOUNT = 2.0, 100
+AMOUNT = 100
 HALF_LIVES = (200.0, 50.0)  # of the path, in ticks
 
 
@@ -47,7 +47,7 @@ def wary(
     k: Annotated[
         float, Setting("attraction of a cell without a trail", least=0.1, most=1000)
     ] = 20.0,
-    fear: Annotated[float, Setting("strength of the repellent", least=0, most=10)] = FEAR,
+    fear: Annotated[float, Setting("strength of the repellent", least=0, most=10)] = 2.0,
 ):
     """Return an action: the rule "deneubourg" with exponent 2, divided by the repellent."""
     sees_nearer = 0
@@ -111,7 +111,7 @@ def decision_tree() -> World:
     return World(full.ranges, queen, [ends[0]], obstacles=rock, regions=regions)
 
 
-def task(mark: Field, half_life: float, fear: float = FEAR) -> Task:
+def task(mark: Field, half_life: float) -> Task:
     """Return the task of a colony whose repellent is a field, and the half-life of its path."""
     path = Field(
         "exponential", half_life, deposit="add", level=20, cap=400, deposited_when="always"
@@ -121,7 +121,6 @@ def task(mark: Field, half_life: float, fear: float = FEAR) -> Task:
         fields={"path": path, "no_entry": mark},
         outbound_cue="path",
         choice=Choice("wary"),
-        rules={"wary": {"fear": fear}},
         traffic=Traffic.named()["following"],
         life=Life(regrowth=0),
         turns_at_queen=True,
@@ -129,14 +128,10 @@ def task(mark: Field, half_life: float, fear: float = FEAR) -> Task:
 
 
 def deliveries_over_time(
-    seeds: list[int],
-    model: str,
-    half_life: float = HALF_LIVES[0],
-    fear: float = FEAR,
-    ants: int = ANTS,
+    seeds: list[int], model: str, half_life: float = HALF_LIVES[0], ants: int = ANTS
 ) -> np.ndarray:
     """Return the deliveries so far, every STEP ticks, (seeds, times)."""
-    worlds, rules_of_all = [decision_tree()] * len(seeds), task(MARKS[model], half_life, fear)
+    worlds, rules_of_all = [decision_tree()] * len(seeds), task(MARKS[model], half_life)
     colony = Colony(worlds, rules_of_all, None, seeds, ants, sharing="frozen")
     colony.begin_episode()
     if model == PLACED:
@@ -169,7 +164,7 @@ def measure(seeds: list[int]) -> model_script.Results:
         axes.set(xlabel="tick", ylabel="food items delivered", ylim=(0, None))
 
     title = "Deliveries on a decision tree, by where a no-entry pheromone is laid"
-    return numbers, summary, title, draw
+    return model_script.Results(numbers, summary, title, draw)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ SHARES, REMOVAL, TICKS, STEP = (0.0, 0.25, 0.5, 0.75), 2000, 4000, 50
 def ants_over_time(seeds, share):
     """Return the number of ants every STEP ticks, (seeds, times)."""
     places = [worlds.open_world(seed, (20, 20, 20)) for seed in seeds]
-    follow = TrainingConfig("q_learning", 1.0, 1.0, epsilon=0.05, epsilon_decay=1.0)
+    follow = TrainingConfig.frozen(epsilon=0.05)
     options = {"capacity": 200, "sharing": "frozen", "q_values": trail_follower("ants")}
     colony, counts = Colony(places, RULES, follow, seeds, ants=32, **options), []
     colony.begin_episode()

@@ -22,7 +22,7 @@ PILE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0,
 def deliveries_over_time(seeds, near, far):
     """Return the deliveries of both nests every STEP ticks, (seeds, times, nests)."""
     world = World((24, 24, 24), [(near, 0, 0), (0, far, far)], foods=PILE)
-    follow = TrainingConfig("q_learning", 1.0, 1.0, epsilon=0.05, epsilon_decay=1.0)
+    follow = TrainingConfig.frozen(epsilon=0.05)
     options = {"sharing": "frozen", "q_values": trail_follower("ants")}
     colony, counts = Colony(world, RULES, follow, seeds, ants=64, **options), []
     colony.begin_episode()

@@ -267,13 +267,11 @@ def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
 
     It is 0 if one of them is constant.
     """
-
-    def centred_ranks(values: np.ndarray) -> np.ndarray:  # equal values share the middle rank
-        return np.sign(values[:, None] - values).sum(axis=1) / 2
+    from scipy.stats import rankdata
 
     def correlation(grids: Grids) -> np.ndarray:
         both = (grids(measure, variant).reshape(len(GRID), -1) for measure in (first, second))
-        one, other = map(centred_ranks, both)
+        one, other = (rankdata(values, axis=0) - (len(GRID) + 1) / 2 for values in both)
         scale = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
         return (one * other).sum(axis=0) / np.where(scale > 0, scale, 1.0)
 

@@ -164,18 +164,24 @@ def test_removing_no_ants_does_not_matter_and_removing_them_does(script):
     [(1000, [[4, 6], [8, 7]], [6.0, 6.5]), (500, [[4, 6], [8, 7]], [12.0, 13.0])],
 )
 def test_deliveries_of_ants_that_misread_by_hand(script, ticks, delivered, expected):
-    found = script("models/misreading", Colony=Given)
+    found = script("models/misreading", Colony=Given, TICKS=ticks)
     Given.deliveries = np.array(delivered)
-    assert found["deliveries"](found["FORAGING"], 0.1, 2, 1, ticks).tolist() == expected
+    assert found["deliveries"](found["FORAGING"], 0.1, [0, 1]).tolist() == expected
+    given = {"with trails": [5, 9], "without": [3, 10]}
+    found["deliveries"] = lambda rules, *_: np.array(
+        next(given[name] for name, one in found["RULES"].items() if one == rules)
+    )
+    rows, summary, *_ = found["measure"]([0, 1])
+    assert table(rows, "misread", "seed", "difference")[:3] == [(0, 0, 2), (0, 1, -1), (0.01, 0, 2)]
+    assert summary[0] == {"misread": 0, "with trails": 5, "without": 3, "difference": 2}
 
 
 @pytest.mark.slow
 def test_a_rate_of_no_misread_cells_does_not_matter_and_a_rate_of_all_does(script):
-    found = script("models/misreading")
-    small = found["FORAGING"], 3, 6, 300  # rules; seeds, episodes, ticks
+    found = script("models/misreading", EPISODES=6, TICKS=300)
 
     def deliveries(rate):
-        return found["deliveries"](small[0], rate, *small[1:])
+        return found["deliveries"](found["FORAGING"], rate, [0, 1, 2])
 
     never, always = deliveries(0.0), deliveries(1.0)
     found["Noise"] = lambda misread: Noise()
@@ -209,13 +215,14 @@ def test_shares_of_crossings_by_hand(script):
         assert worlds == [(some, True) for some in several]
 
 
-@pytest.mark.parametrize(
-    ("which", "expected"),
-    [([True] * 9, "100 [100, 100]"), ([False] * 9, "  0 [0, 0]"), ([True, False] * 50, " 50 [")],
-)
-def test_intervals_of_shares(script, which, expected):
-    interval = script("models/double_bridge")["interval"]
-    assert interval(np.array(which)).startswith(expected)
+def test_chosen_branches_by_hand(script):
+    """A colony chooses with 80 % of its crossings on one branch; without any, it is left out."""
+    given = np.array([0.75, 0.125, np.nan, 0.5])
+    found = script("models/double_bridge", shares=lambda *_: given, BRIDGES={"equal": (20, 0)})
+    rows, summary, *_ = found["measure"]([0, 1, 2, 3])
+    assert [row["short_share"] for row in rows[:2]] == [0.75, 0.125]
+    assert len(rows) == 2 * 4
+    assert table(summary[:3], "short (%)", "one side (%)") == [(100, 0), (0, 100), (0, 0)]
 
 
 @pytest.mark.slow
@@ -498,7 +505,7 @@ def test_names_of_equal_branches_do_not_matter():
     [(1, 2, 4, 3), (5, 0, 4, -0.6), (2, 0, 4, 0), (0, -1, 0, -0.2), (-3, -1, 0, 2)],
 )
 def test_td_errors_of_hysteretic_q_learning_by_hand(script, value, reward, largest, error):
-    td_error = script("plugins/hysteretic")["td_error"].__wrapped__
+    td_error = script("plugins/hysteretic")["td_error"]
     next_values = np.array([-9.0, largest, -9.0, -9.0, -9.0])
     assert td_error(value, reward, 0.5, next_values, 0, 0.3) == pytest.approx(error)
 

@@ -94,9 +94,9 @@ def test_a_table_has_a_line_for_each_condition():
     low, high = bootstrap_interval(np.array([[1.0, 2.0, 4.0]]))
     lines = table(rows).splitlines()
     assert lines[0].split() == ["kind", "x"]
-    assert lines[2] == f"a     2.333 [{low[0]:.4g}, {high[0]:.4g}]"
+    assert lines[2] == f"a    2.333 [{low[0]:.4g}, {high[0]:.4g}]"
     assert len(lines) == 4
-    assert table(rows[:1]).splitlines()[2] == "a     1"
+    assert table(rows[:1]).splitlines()[2] == "a    1"
 
 
 @pytest.fixture

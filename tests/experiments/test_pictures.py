@@ -11,13 +11,7 @@ import learning
 import numpy as np
 import pytest
 from command_lines import ROOT, assert_one_sentence, call_script
-from learning import (
-    Checkpoint,
-    learning_checkpoints,
-    learning_frames,
-    noted_checkpoints,
-    typical_seed,
-)
+from learning import Checkpoint, Lessons, learning_frames, noted_checkpoints
 from named_states import parse_state
 from PIL import Image
 from policy_sheet import clarity, policy_sheet, usual_spread
@@ -45,7 +39,7 @@ def test_the_account_says_where_the_return_comes_from() -> None:
     assert account[-1].tolist() == [16, 16, 3, 10, 0]
     assert account[0].tolist() == [0] * 5
     for seed, checkpoints in ((2, (0, 10)), (7, (10, 30))):
-        for checkpoint in learning_checkpoints(paper(), CONFIG, seed, checkpoints, 80):
+        for checkpoint in Lessons(paper(), CONFIG, 80).checkpoints(seed, checkpoints):
             returns = np.concatenate([[0], checkpoint.episode.trace.rewards.cumsum()])
             assert (checkpoint.account().sum(axis=1) == returns).all()
             assert (checkpoint.account()[:, :4] >= 0).all()
@@ -54,8 +48,9 @@ def test_the_account_says_where_the_return_comes_from() -> None:
 
 def test_the_typical_seed_is_the_one_nearest_to_the_middle_rank_at_every_stage() -> None:
     seeds, checkpoints, steps = (3, 14, 15, 92, 65, 35, 89, 79), (0, 1, 3), 80
-    chosen, deliver = typical_seed(paper(), CONFIG, seeds, checkpoints, steps)
-    played = {s: learning_checkpoints(paper(), CONFIG, s, checkpoints, steps) for s in seeds}
+    lessons = Lessons(paper(), CONFIG, steps)
+    chosen, deliver = lessons.typical_seed(seeds, checkpoints)
+    played = {seed: lessons.checkpoints(seed, checkpoints) for seed in seeds}
     for n, told in enumerate(deliver):
         assert told == sum(several[n].episode.delivered for several in played.values())
     assert deliver[0] < deliver[-1]
@@ -75,7 +70,7 @@ def test_the_typical_seed_is_the_one_nearest_to_the_middle_rank_at_every_stage()
 
 
 def test_a_stage_that_has_ended_stays() -> None:
-    checkpoints = learning_checkpoints(paper(), CONFIG, 2, (0, 50), 60)
+    checkpoints = Lessons(paper(), CONFIG, 60).checkpoints(2, (0, 50))
     short, long = sorted(checkpoints, key=lambda checkpoint: len(checkpoint.episode))
     assert len(short.episode) < len(long.episode) == 61
     shown = list(learning_frames(checkpoints, (640, 400), "a title"))
@@ -90,7 +85,7 @@ def test_a_stage_that_has_ended_stays() -> None:
 
 @pytest.mark.parametrize("size", [(1280, 720), (64, 64)])
 def test_all_stages_fit(size, tmp_path) -> None:
-    checkpoints = learning_checkpoints(paper(), CONFIG, 0, (0, 1, 2, 3), 3)
+    checkpoints = Lessons(paper(), CONFIG, 3).checkpoints(0, (0, 1, 2, 3))
     save_animation(tmp_path / "a.gif", learning_frames(checkpoints, size), 10)
     with Image.open(tmp_path / "a.gif") as image:
         assert image.size == size

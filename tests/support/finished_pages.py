@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from colony import colony_page
 from colony_figures import draw_all as draw_study
-from colony_findings import Results as StudyResults
+from colony_findings import Measured, condition_rows, judge_all
 from paper.baselines import Baseline
 from paper.claims import Audit, assess
 from paper.comparison import DYNA_P5, Comparison
@@ -67,28 +67,27 @@ def comparison_html() -> str:
 
 
 @cache
-def study_results() -> StudyResults:
+def study_measures() -> Measured:
     """Return a study in which the three rules double the deliveries."""
 
     def truth(rules: str, regime: str, ants: int) -> float:
         return 20.0 * ants * (2 if rules in ("foraging", "queueing") and ants > 1 else 1)
 
-    measured = build_study(truth, seeds=12, world_kinds=("paper", "open", "small"))
-    return StudyResults.of(measured)
+    return build_study(truth, seeds=12, world_kinds=("paper", "open", "small"))
 
 
 @cache
 def colony_html() -> str:
-    """Return the page of `study_results`."""
+    """Return the page of `study_measures`."""
     steady = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
     colony = Colony(
         worlds.paper(), Task(), steady, 3, ants=9, sharing="frozen", q_values=trail_follower()
     )
     colony.begin_episode()
-    found = study_results()
+    rows = condition_rows(study_measures())
     return colony_page(
-        found,
-        drawings=drawings(draw_study(found.rows)),
+        *(rows, judge_all(study_measures())),
+        drawings=drawings(draw_study(rows)),
         players=[Player("Paper's rules", "Nine ants", record_colony(colony, 30))],
         facts=FACTS,
         files=["seeds.csv"],
