@@ -157,10 +157,10 @@ def test_whole_trainings_of_a_mixed_sweep():
         configs = [random_config(seed, names[seed % len(names)]) for seed in range(2 * len(names))]
         # Only this one learns from an episode that is cut off.
         configs.append(TrainingConfig("n_step_sarsa", 0.37, 0.9, 0.3, 0.99, n_steps=3))
-        result = train(world, configs, seeds=(-1, 2**63 + 5), episodes=6, max_steps=70, task=task)
+        result = train(world, configs, seeds=(-1, 2**63 + 5), episodes=4, max_steps=60, task=task)
         for c, config in enumerate(configs):
             for s, seed in enumerate(result.seeds):
-                plain = plain_runs.train(world, config, seed, 6, 70, task)
+                plain = plain_runs.train(world, config, seed, 4, 60, task)
                 assert result.returns[c, s].tolist() == plain.returns
                 assert result.steps[c, s].tolist() == plain.steps
                 assert result.deliveries[c, s].tolist() == plain.deliveries
