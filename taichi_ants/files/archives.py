@@ -42,11 +42,16 @@ def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: b
     files.write_atomically(path, save)
 
 
-def read(path: files.PathLike, content: bytes | None = None, most: int = MOST_BYTES) -> Arrays:
+def read(
+    path: files.PathLike,
+    content: bytes | None = None,
+    most: int = MOST_BYTES,
+    sealed: bool = False,
+) -> Arrays:
     """Return all arrays of an .npz file, without executing anything in it.
 
     With `content`, the bytes of the file, `path` is its name in messages. `most` limits the bytes
-    of the file, and of its unpacked arrays. Files of other software have no checksum.
+    of the file, and of its unpacked arrays. With `sealed`, a file without a checksum is refused.
     """
     source = files.opened(path, most) if content is None else nullcontext(io.BytesIO(content))
     name = files.named(path)
@@ -65,8 +70,8 @@ def read(path: files.PathLike, content: bytes | None = None, most: int = MOST_BY
                     raise ValueError("it is not an archive that NumPy wrote")
                 arrays = dict(archive)  # zipfile checks their CRC-32
             written = arrays.pop(_CHECKSUM, None)
-            if written is not None and str(written) != _checksum(arrays):
-                raise ValueError("the checksum differs")
+            if sealed if written is None else str(written) != _checksum(arrays):
+                raise ValueError("the checksum is missing or differs")
             return arrays
         except (AntsError, OSError, MemoryError):
             raise
@@ -94,13 +99,14 @@ class Kind:
         name: The name of the content, for example "colony".
         version: The version of the format; reading refuses all other versions.
         writer: The function that writes such files, for messages.
-        most: See `read`.
+        most, sealed: See `read`. Files with indices of kernels are sealed.
     """
 
     name: str
     version: int
     writer: str
     most: int = MOST_BYTES
+    sealed: bool = False
 
     def write(
         self,
@@ -118,7 +124,7 @@ class Kind:
         self, path: files.PathLike, content: bytes | None = None
     ) -> Iterator[tuple[Arrays, dict[str, Any]]]:
         """Yield the arrays and facts of a file to a block, whose errors become an AntsError."""
-        arrays = read(path, content, self.most)
+        arrays = read(path, content, self.most, self.sealed)
         try:
             facts = json.loads(arrays.pop("facts").item())
             kind, version = facts["kind"], facts["version"]

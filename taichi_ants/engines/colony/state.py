@@ -67,7 +67,7 @@ _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
 # Unused settings for colonies with given actions, in which ants neither choose nor learn.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
-_KIND = Kind("colony", 14, "Colony.save")
+_KIND = Kind("colony", 14, "Colony.save", sealed=True)
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")

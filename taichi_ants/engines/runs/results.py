@@ -25,7 +25,7 @@ from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
-_KIND = Kind("training result", 7, "TrainingResult.save")
+_KIND = Kind("training result", 7, "TrainingResult.save", sealed=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
