@@ -99,7 +99,7 @@ class Kind:
         name: The name of the content, for example "colony".
         version: The version of the format; reading refuses all other versions.
         writer: The function that writes such files, for messages.
-        most, sealed: See `read`. Files with indices of kernels are sealed.
+        most, sealed: See `read`; `sealed` is for files with indices of kernels.
     """
 
     name: str
