@@ -23,6 +23,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import numpy as np
     from PIL import Image
     from scipy.ndimage import gaussian_filter
+    from scipy.spatial import cKDTree
 
     from taichi_ants import Colony, Interventions, TrainingConfig, World, files, task
     from taichi_ants.grid.hexgrid import AxialGrid, centre_of, cube
@@ -199,7 +200,8 @@ class Painter:
         self.look, self.grid = look, grid
         width, height = SIZE[0], SIZE[1] - BAND
         x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, np.arange(height) + 0.5 - height / 2)
-        self.cell = grid.index(cells_at(x / HEXAGON, y / HEXAGON))  # of each pixel
+        _, nearest = cKDTree(CENTRES).query(np.stack([x, y], axis=-1))
+        self.cell = grid.index(CELLS)[nearest]  # of each pixel
         corner = np.array([width, height])[:, None, None] / 2 - ROUND - np.abs(np.stack([x, y]))
         self.panel = np.clip(ROUND + 0.5 - np.hypot(*np.minimum(corner, 0)), 0, 1)[..., None]
         self.rocks = grid.index(CELLS[within(*ROCKS)])
@@ -267,18 +269,6 @@ class Painter:
         height, width = self.cell.shape
         middle = np.array([width, height]) * DRAWN_AT / 2
         return centre_of(self.grid.cells(cells), DRAWN_AT * HEXAGON) + middle
-
-
-def cells_at(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the cells at places, in hexagon sizes, as cube coordinates (..., 3)."""
-    r = x / 1.5
-    q = r / 2 - y / math.sqrt(3)
-    exact = np.stack([q, r, np.zeros_like(q)], axis=-1) - (q + r)[..., None] / 3
-    near = np.rint(exact)  # the sum must be 0: mend the coordinate that was rounded most
-    worst = np.abs(near - exact).argmax(axis=-1)[..., None]
-    rest = np.take_along_axis(near, worst, axis=-1) - near.sum(axis=-1, keepdims=True)
-    np.put_along_axis(near, worst, rest, axis=-1)
-    return (near - near.min(axis=-1, keepdims=True)).astype(np.int64)
 
 
 def film(course: Course, look: Look) -> Iterator[np.ndarray]:
