@@ -130,10 +130,13 @@ class Scene:
         letters, margin = round(shorter / 38), max(2, round(shorter / 60))
         self._panel: tuple[int, int, int] | None = None  # left edge, width, text size
         room = width  # pixels for the world, on the left
+        self._page = np.full((self._height, width, 3), colours.channels(colours.PAGE))
         if overlay and letters >= text.SMALLEST:
             room -= _PANEL_WIDTH * letters + margin
             self._panel = room, width - margin - room, letters
         self._margin = margin
+        self._legend: tuple[list[_Entry], str, np.ndarray]
+        self._legend = [], "", np.zeros(0)
         beyond = view and overlay
         self._rasteriser = Rasteriser(grid, room, self._height, margin, beyond, scales)
 
@@ -153,22 +156,37 @@ class Scene:
         world = self._draw_world(snapshot, status)
         if self._panel is None:
             return world
-        left, width, size = self._panel
-        shape = self._height, left + width + self._margin, 3
-        frame = np.full(shape, colours.PAGE & 255, np.uint8)
+        frame = self._page.copy()
         frame[:, : world.shape[1]] = world
+        left, width, size = self._panel
         text.write(frame, self._title, left, self._margin + size, size, room=width)
         if status is not None:
             top = self._margin + round(_TITLE_HEIGHT * size) * bool(self._title)
             _draw_status(frame, status, top, *self._panel)
-        self._draw_legend(frame, snapshot, *self._panel)
+        self._add_legend(frame, snapshot)
         return frame
 
+    def _add_legend(self, frame: np.ndarray, snapshot: Snapshot) -> None:
+        """Draw the legend: its pixels of the last frame, unless a scale or an entry has changed."""
+        assert self._panel is not None
+        entries = [*self._further_entries(snapshot), *_LEGEND]
+        most = f"{self._rasteriser.darkest(TRAIL, snapshot.trail)} and more"
+        if self._legend[:2] != (entries, most):
+            page = self._page.copy()
+            self._draw_legend(page, entries, most, *self._panel)
+            rows, columns, _ = (page != self._page).nonzero()
+            self._legend = entries, most, page[rows.min() :, columns.min() :]
+        legend = self._legend[2]
+        corner = np.s_[-legend.shape[0] :, -legend.shape[1] :]
+        if (frame[corner] == self._page[corner]).all():
+            frame[corner] = legend
+        else:  # in a small picture, it covers a part of the status
+            self._draw_legend(frame, entries, most, *self._panel)
+
     def _draw_legend(
-        self, frame: np.ndarray, snapshot: Snapshot, left: int, width: int, size: int
+        self, frame: np.ndarray, entries: list[_Entry], most: str, left: int, width: int, size: int
     ) -> None:
         """Draw the legend, which grows upwards with its entries."""
-        entries, tables, labels = [*self._further_entries(snapshot), *_LEGEND], [], []
         cue = self._task.homing_cue if self._task else COMPASS
         if cue != COMPASS:
             label = "trail (S)" if cue == TRAIL else f"field {cue} (S)"
@@ -181,15 +199,14 @@ class Scene:
             ant_x, label_x = x, left + round(2.1 * size)
             strongest = int(colours.field_ramp(entry.number)[-1])
             field = marks((x, y), radius, Mark.HEXAGON, strongest)
-            tables.append(cell(entry.cell, (x, y), radius, entry.number) if entry.cell else field)
+            tables = [cell(entry.cell, (x, y), radius, entry.number) if entry.cell else field]
             if entry.ant is not None:
                 if entry.cell == "Q":  # to the right of the queen
                     ant_x, label_x = x + 1.7 * size, label_x + round(1.7 * size)
                 look, colour = (entry.ant, hexagon, 0.83 * radius), int(colours.ANTS[entry.number])
                 tables.append(ants((ant_x, y), 1, *look, colour=colour))
-            labels.append((entry, label_x, round(y + 0.36 * size)))
-        draw_marks(frame, *tables)
-        for entry, label_x, baseline in labels:
+            draw_marks(frame, *tables)
+            baseline = round(y + 0.36 * size)
             text.write(frame, entry.letter, x, baseline, size, align="middle")
             text.write(frame, entry.label, label_x, baseline, size)
         y = first + round(1.45 * size)
@@ -200,7 +217,6 @@ class Scene:
         frame[y : y + round(0.7 * size), left : left + width] = ramp
         y += round(1.75 * size)
         text.write(frame, "1", left, y, size, colours.FAINT_INK)
-        most = f"{self._rasteriser.darkest(TRAIL, snapshot.trail)} and more"
         text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
 
     def _further_entries(self, snapshot: Snapshot) -> list[_Entry]:

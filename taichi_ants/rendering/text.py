@@ -39,16 +39,31 @@ def write(
     """
     if size < SMALLEST:
         return
-    from PIL import Image, ImageDraw
-
     text = text if room is None else shortened(text, size, room)
     start = {"left": 0.0, "middle": 0.5, "right": 1.0}[align] * width(text, size)
-    x, y, n = round(x - start), round(baseline), round(width(text, size))
-    top, left = max(0, y - 2 * size), max(0, x - size)
-    part = frame[top : y + size, left : x + n + size]  # a copy of the whole frame would be slow
-    image, ink = Image.fromarray(part), tuple(channels(colour).tolist())
-    ImageDraw.Draw(image).text((x - left, y - top), _plain(text), ink, _font(size), anchor="ls")
-    part[:] = image
+    mask, right_of, below = _mask(text, size)
+    left, top = round(x - start) + right_of, round(baseline) + below
+    mask = mask[max(0, -top) :, max(0, -left) :]
+    part = frame[max(0, top) :, max(0, left) :][: len(mask), : mask.shape[1]]
+    mask = mask[: len(part), : part.shape[1]]
+    # As Pillow rounds, in 16 bits.
+    mixed = part * (255 - mask) + channels(colour) * mask + 128
+    part[:] = ((mixed >> 8) + mixed) >> 8
+
+
+@lru_cache(maxsize=1024)
+def _mask(text: str, size: int) -> tuple[np.ndarray, int, int]:
+    """Return the opacity of a text's pixels, 0 to 255, uint16 (height, width, 1).
+
+    The integers are the position of its corner, relative to the start of the baseline.
+    """
+    from PIL import Image, ImageDraw
+
+    image = Image.new("L", (round(width(text, size)) + 2 * size, 3 * size))
+    ImageDraw.Draw(image).text((size, 2 * size), _plain(text), 255, _font(size), anchor="ls")
+    left, top, right, bottom = image.getbbox() or (0, 0, 0, 0)
+    mask = np.asarray(image, np.uint16)[top:bottom, left:right, None]
+    return mask, left - size, top - 2 * size
 
 
 def write_on(
