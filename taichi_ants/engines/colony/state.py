@@ -454,7 +454,9 @@ class ColonyState:
         self.nests_at_start = nests = self._of_each(lambda world: world.nests_of(n))
         # Columns of the ants by world and number.
         headings = np.array([headings for _, headings in starts], np.int8)
-        self.first = {"cell": cells, "heading": headings, "nest": nests.astype(np.int8)}
+        self.first = {"cell": cells, "heading": headings}
+        if self.n_nests > 1:
+            self.first["nest"] = nests.astype(np.int8)
         for feature in model.features:
             self.first |= feature.columns(self)
         ground, kinds = self._of_each(World.ground), self._of_each(World.kinds_by_cell)
