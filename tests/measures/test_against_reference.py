@@ -41,7 +41,7 @@ def expected(plain: ReferenceColony) -> list[dict]:
     ("schedule", "threads", "changes"),
     [
         ("by_chunk", 2, True),
-        ("by_world", 1, False),
+        pytest.param("by_world", 1, False, marks=pytest.mark.slow),
         pytest.param("by_chunk", 2, False, marks=pytest.mark.long),
         pytest.param("by_world", 2, True, marks=pytest.mark.long),
     ],

@@ -306,6 +306,7 @@ def homely(view):
     return index
 
 
+@pytest.mark.slow
 def test_an_observation_is_compared_with_the_reference(monkeypatch):
     monkeypatch.setattr(seen.OBSERVATIONS, "yours", dict(seen.OBSERVATIONS.yours))
     monkeypatch.setattr(testing, "SEEDS", 2)  # each with a kernel of its own
@@ -318,12 +319,8 @@ def test_an_observation_is_compared_with_the_reference(monkeypatch):
     assert check.difference.startswith("seed 0, tick ")
 
 
-LONG = pytest.mark.long
-
-
-@pytest.mark.parametrize(
-    "name", ["alarm", *(pytest.param(n, marks=LONG) for n in ("hungry", "demanded"))]
-)
+@pytest.mark.long  # whole models have such rules, too
+@pytest.mark.parametrize("name", ["alarm", "hungry", "demanded"])
 def test_rules_that_read_other_fields_and_labour_equal_the_reference(name, monkeypatch):
     monkeypatch.setattr(testing, "SEEDS", 2 if name == "alarm" else testing.SEEDS)
     assert check_rule(name, 100).difference == ""

@@ -78,7 +78,7 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK, LONG = (0, 1, 10, 13), (2, 3, 6, 7, 8, 14)
+QUICK, LONG = (0, 1, 10, 13), (2, 3, 4, 5, 6, 7, 8, 14)
 
 
 def marked(kernels: list, quick: tuple[int, ...], long: tuple[int, ...]) -> list:
@@ -213,7 +213,8 @@ def levels_seen(world, ant):
     return index
 
 
-@pytest.mark.parametrize("noise", ["misread", pytest.param("", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", ["misread", ""])
 def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
     """Drawn colonies whose ants observe two fields, in every tick."""
     monkeypatch.setattr(observation.OBSERVATIONS, "yours", dict(observation.OBSERVATIONS.yours))

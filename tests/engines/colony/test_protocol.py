@@ -150,6 +150,7 @@ def followers(seeds, schedule=None, world=None):
     return Colony(*given, **rules, schedule=schedule)
 
 
+@pytest.mark.slow
 def test_runs_with_a_protocol_do_not_depend_on_other_worlds_or_the_schedule():
     every = followers(range(4)).run(2, 160, protocol=PROTOCOL)
     assert followers(range(4), "by_chunk").run(2, 160, protocol=PROTOCOL) == every
