@@ -10,7 +10,8 @@ POINTS = {
     # An ant begins: at the start, by a birth, or by an intervention.
     "born": "a",
     # An ant is about to choose an action. The hook returns 1 if the ant rests in this tick, else 0,
-    # and the random stream. It rests if one of the hooks returns 1.
+    # and the random stream. It rests if one of the hooks returns 1, and then drops an action that
+    # it has drawn before.
     "choose": "a stream",
     # An ant that does not rest is about to execute the action of the hook before, at first the
     # chosen one. The hook returns an action and the random stream.

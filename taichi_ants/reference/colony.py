@@ -189,7 +189,7 @@ class ReferenceColony:
         intents = []
         for ant in acting:
             if self._any("choose", ant):
-                ant.action = -1
+                ant.action, ant.chosen = -1, None
                 intents.append(Intent(ant, GIVE, rests=True))
                 continue
             ant.action = self._draw_action(ant, tick) if ant.chosen is None else ant.chosen

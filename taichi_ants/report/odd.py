@@ -172,6 +172,8 @@ class Model:
             values = self.values(f"{path}.{name}") if name else [True]
             default = defaults.get(f"{cls.path}.{name}")
             said = [v for v in values if (in_words(v) == wanted if wanted else v != default)]
+            if not wanted:  # a value can have a sentence of its own
+                said = [v for v in said if f"{name}={in_words(v)}" not in cls.sentences]
             for other in re.findall(r"\{([\w.]+)\}", sentence):
                 shown = said if other == name else self.values(f"{path}.{other}")
                 shown = [value for value in shown if value is not None] or [None]

@@ -417,7 +417,7 @@ def want(c, v, w, chunk, ant, tick):
     resting = 0
     for choose in ti.static(v.at["choose"]):
         rests, random_state = choose(ant_view(c, v, w, ant), random_state)
-        if rests == 1:  # without food, this action does nothing; `observe_and_learn` removes it
+        if rests == 1:  # `act` does nothing then, and `observe_and_learn` removes the action
             resting, action = 1, constants.GIVE
     if action < 0:
         random_state = advance(random_state)
@@ -548,6 +548,8 @@ def act(c, v, w, chunk, ant, tick):
         c.ground[base + cell] = EMPTY
     c.want[ant] = cell  # the cell with the ant's mark
     had_food, age = carries, c.carried[ant]
+    for rests in ti.static(v.at["rests"]):  # an ant that rests with food keeps it
+        action = ti.select(rests(ant_view(c, v, w, ant)) == 1, -1, action)
     if carries == 1:
         carried = age
         if goes != cell:
