@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import runpy
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -437,9 +438,8 @@ def test_learning_rates_do_not_matter_to_fixed_rules_and_exploration_does(script
     assert fixed.min() > 0
     assert deliveries(1.0).max() < 0.5 * fixed.min()
     assert not np.array_equal(deliveries(0.0), fixed)
-    found["TrainingConfig"] = lambda name, rate, *given, **named: training(
-        "q_learning", 0.9, *given, **named
-    )
+    learns = SimpleNamespace(frozen=lambda e: replace(training.frozen(e), learning_rate=0.5))
+    found["TrainingConfig"] = learns
     assert np.array_equal(deliveries(0.01), fixed)
 
 
