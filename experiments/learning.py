@@ -71,7 +71,7 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class Lessons:
-    """What ants learn, and how they are followed after a number of training episodes."""
+    """The world and the rules of training, and the limits of the rollouts that show its progress."""
 
     world: World
     config: TrainingConfig

@@ -57,7 +57,7 @@ ODD = {
     "a learner": lambda _: learners.get(LONG),
     "no learner": lambda _: learners.get(["sarsa"]),
     "no configuration": lambda _: learners.with_hyperparameters(None),
-    "a name of one's own": lambda _: learners.Learner(LONG, 3),
+    "a long name": lambda _: learners.Learner(LONG, 3),
     "who is followed": lambda colony: record_colony(colony, follow=np.zeros(0)),
     "a state": lambda _: states.state_name(2**31),
     "a first value": lambda _: offline.fitted_q_iteration(data(), initial_q=None),

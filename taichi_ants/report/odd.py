@@ -172,7 +172,7 @@ class Model:
             values = self.values(f"{path}.{name}") if name else [True]
             default = defaults.get(f"{cls.path}.{name}")
             said = [v for v in values if (in_words(v) == wanted if wanted else v != default)]
-            if not wanted:  # a value can have a sentence of its own
+            if not wanted:  # unless the value has its own sentence
                 said = [v for v in said if f"{name}={in_words(v)}" not in cls.sentences]
             for other in re.findall(r"\{([\w.]+)\}", sentence):
                 shown = said if other == name else self.values(f"{path}.{other}")

@@ -155,4 +155,4 @@ def test_colonies_in_which_nobody_crosses_are_left_out_of_the_figure(
         with Image.open(path) as image:
             assert np.asarray(image.convert("RGB")).std() > 5
         with pytest.raises(AntsError):
-            draw(path / "bridge.png", found, 3000)  # a file is no folder
+            draw(path / "bridge.png", found, 3000)  # bridge.png is no folder, but a file
