@@ -71,7 +71,7 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class Lessons:
-    """The world and the rules of training, and the limits of the rollouts that show its progress."""
+    """The world, the rules of training, and the limits of the rollouts that show its progress."""
 
     world: World
     config: TrainingConfig
