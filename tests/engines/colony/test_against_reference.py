@@ -213,8 +213,7 @@ def levels_seen(world, ant):
     return index
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("noise", ["misread", ""])
+@pytest.mark.parametrize("noise", ["misread", pytest.param("", marks=pytest.mark.slow)])
 def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
     """Drawn colonies whose ants observe two fields, in every tick."""
     monkeypatch.setattr(observation.OBSERVATIONS, "yours", dict(observation.OBSERVATIONS.yours))
