@@ -193,7 +193,7 @@ MUTATIONS = [
     # Engines.
     ("engines/runs/kernels.py", "step + 1 == a.max_steps", "step == a.max_steps", RUNS),
     ("engines/runs/kernels.py", "clock += a.evaporates", "clock += 1", RUNS),
-    ("engines/runs/rollout_kernel.py", "steps == a.max_steps", "steps > a.max_steps", ROLLOUT),
+    ("engines/runs/rollout_kernel.py", "steps == a.max_steps", "steps > a.max_steps", BATCHED),
     ("engines/runs/rollout_kernel.py", "base = own", "base = origin", ROLLOUT),
     ("engines/runs/step.py", "enters & ant.carries", "moves & ant.carries", BATCHED),
     ("task/rules/vision.py", "(state >> 1) & 21", "(state >> 1) & 5", BATCHED),

@@ -98,6 +98,8 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
     for seed in range(8 if is_large else 12 if later else 20):
         rewards, changes = random_rewards(seed), kernel is not KERNELS[0]
         drawn = of_kernel(seed, *parts, rewards=rewards, changes=changes, **rules)
+        if drawn.sharing == "independent":  # newborn ants begin with these values
+            drawn = replace(drawn, training=replace(drawn.training, initial_q=1.7))
         colony, plain = both(drawn)
         for _ in every_tick(
             colony, plain, (11, None), (8, without_rocks(drawn.world) if seed % 2 else None)
