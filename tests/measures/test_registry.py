@@ -10,6 +10,7 @@ import pytest
 from taichi_ants import AntsError, Colony, TrainingConfig, When, measures, summary, train, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.measures.measure import MEASURES
+from taichi_ants.measures.series import Recorder
 
 FROZEN = {"sharing": "frozen", "q_values": trail_follower()}
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
@@ -49,6 +50,14 @@ def test_your_own_measure_is_read_as_the_others():
     assert list(values) == ["north", "loads.with", "loads.without"]
     assert np.isnan(values["loads.without"]).all()
     assert result.series.units["north"] == "ants"
+
+
+def test_a_world_has_one_row_for_a_tick():
+    ours, recorder = colony(), Recorder("deliveries")
+    ours.begin_episode()
+    for _ in range(2):
+        recorder.read(ours)
+    assert recorder.series().worlds.tolist() == [0, 1, 2]
 
 
 def test_a_measure_of_counts_works_for_colonies_and_lone_ants():

@@ -200,9 +200,10 @@ def test_interventions_by_hand_change_the_worlds_that_are_named():
     for one in ({"clear": [cell]}, {"place": {"what": "rock", "cells": [cell]}}):
         Interventions(colony, worlds=[0, 2]).apply(from_dict(one))
     Interventions(colony, worlds=[1]).apply(from_dict({"remove_ants": 4}))
+    Interventions(colony, worlds=[2]).apply(RemoveAnts(share=0.125))  # 2.5 ants
     grounds = [int(colony.snapshot(w).ground[colony.grid.index(cell)]) for w in range(3)]
     assert grounds == [OBSTACLE, EMPTY, OBSTACLE]
-    assert colony.living.sum(axis=1).tolist() == [20, 16, 20]
+    assert colony.living.sum(axis=1).tolist() == [20, 16, 17]
     for one in ({"epsilon": 0.5}, {"task": {"pheromone.level": 9}}, {"ants": 5}):
         with pytest.raises(AntsError, match="the worlds of a colony share"):
             Interventions(colony, worlds=[1]).apply(from_dict(one))
