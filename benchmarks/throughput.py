@@ -34,7 +34,8 @@ from taichi_ants.grid.randomness import stream_state
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES
 
-SOURCES = [Path(__file__).with_name(name) for name in ("ant.c", "ant_vector.c")]
+ENGINE = Path(__file__).resolve().parent.parent / "lab" / "engine"  # the C that the lab shares
+SOURCES = [ENGINE / "ant.c", Path(__file__).with_name("ant_vector.c")]
 FLAGS = ("-O3", "-march=native", "-std=c11", "-ffp-contract=off", "-shared", "-fPIC")
 LEARNERS = {
     "Q-learning": ("q_learning", 0),
@@ -122,7 +123,7 @@ def compile_c(command: str, sources: Sequence[Path], library: Path, threads: int
     """
     parallel = ["-fopenmp"] if threads > 1 else []
     done = subprocess.run(
-        [command, *FLAGS, *parallel, "-o", library, *sources, "-lm"],
+        [command, *FLAGS, *parallel, f"-I{ENGINE}", "-o", library, *sources, "-lm"],
         capture_output=True,
         text=True,
     )
