@@ -348,13 +348,13 @@ class Settings:
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
         """Return the settings in a mapping, checked; groups are mappings or names."""
-        if not is_table(facts):
-            refuse(f"`{cls.path}`", facts, "a table of settings")
         return cls(**cls._required(facts)).replace(**facts)
 
     @classmethod
     def _required(cls, facts: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the settings in a mapping that have no default; AntsError if one is missing."""
+        """Return the settings that have no default; AntsError if one is missing in a table."""
+        if not is_table(facts):
+            refuse(f"`{cls.path}`", facts, "a table of settings")
         required = [setting for setting in declared(cls) if setting.default is MISSING]
         for setting in required:
             if setting.name not in facts:
@@ -495,7 +495,7 @@ def is_table(value: object) -> bool:
 
 
 def table_of(path: str, values: Any) -> dict[str, Any]:
-    """Return a table of settings, also as pairs of a name and a value, as a dict; else AntsError."""
+    """Return a table of settings, or pairs of a name and a value, as a dict; else AntsError."""
     with suppress(TypeError, ValueError):
         if is_table(table := dict(values)):
             return table

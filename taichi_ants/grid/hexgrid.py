@@ -160,7 +160,7 @@ class AxialGrid:
         return high.reshape(-1)
 
     def number(self, index: np.ndarray) -> np.ndarray:
-        """Return the ranks, int32 (...), of cells in lexicographic order, from flat indices (...)."""
+        """Return the ranks, int32 (...), of flat indices (...) in lexicographic order of cells."""
         _, y_range, z_range = self.ranges
         r, q = np.divmod(index.astype(np.int32), np.int32(self.width))
         r -= z_range

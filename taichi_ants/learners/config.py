@@ -92,6 +92,11 @@ class TrainingConfig(Settings, path="training"):
         object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
 
     @classmethod
+    def from_dict(cls, facts: Any) -> TrainingConfig:
+        """Return the configuration in a mapping, which can have hyperparameters, too."""
+        return cls(**cls._required(facts) | facts)
+
+    @classmethod
     def frozen(cls, epsilon: float = 0.0) -> TrainingConfig:
         """Return the settings of ants that explore with a constant epsilon, and do not learn."""
         return cls("q_learning", 1.0, 1.0, epsilon, 1.0)
