@@ -39,10 +39,11 @@ class Range:
     @classmethod
     def of(cls, name: str, table: Mapping[str, Any], whole: bool) -> Range:
         """Return the range in a table; AntsError, which begins with `name`, if it is not one."""
-        low, high, scale = (table.get(key) for key in ("from", "to", "scale"))
+        ends: Any = table.get("from"), table.get("to")
+        (low, high), scale = ends, table.get("scale", "linear")
         kinds, log = (int,) if whole else (int, float), scale == "log"
-        fits = all(type(end) in kinds and abs(end) <= 2**53 for end in (low, high))
-        fits = fits and low < high and (low > 0 if log else scale in (None, "linear"))
+        fits = all(type(end) in kinds and abs(end) <= 2**53 for end in ends)
+        fits = fits and low < high and (low > 0 if log else scale == "linear")
         if not fits or table.keys() - {"from", "to", "scale"}:
             raise AntsError(
                 f"{name} is {shown(dict(table))}; a range has the keys from and to, which are "
