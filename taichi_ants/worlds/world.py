@@ -301,8 +301,10 @@ def free_cells(
 
     if where == "spread":
         order = words(index)
-        first = np.argpartition(order, n - 1)[:n]  # of millions; hashes of different cells differ
-        return index[first[np.argsort(order[first])]]
+        if n < len(order):  # sort only the smallest of perhaps millions; no two are equal
+            first = order < np.partition(order, n)[n]
+            index, order = index[first], order[first]
+        return index[np.argsort(order)]
     queues = []
     for queen in queens.tolist():
         distance = grid.distances(tuple(queen))[index]
