@@ -39,6 +39,7 @@ from typing import (
     Generic,
     Literal,
     NamedTuple,
+    TypeGuard,
     TypeVar,
     Union,
     get_args,
@@ -489,7 +490,7 @@ def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
     return f"is not a setting{of}; choose {choice}."
 
 
-def is_table(value: object) -> bool:
+def is_table(value: object) -> TypeGuard[Mapping[str, Any]]:
     """Return whether a value is a mapping whose names are text."""
     return isinstance(value, Mapping) and all(isinstance(name, str) for name in value)
 

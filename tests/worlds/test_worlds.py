@@ -8,9 +8,7 @@ from hypothesis import strategies as st
 
 from taichi_ants import worlds
 from taichi_ants.errors import AntsError
-from taichi_ants.grid.constants import STREAM_START_CELL
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.grid.randomness import stream_state
 from taichi_ants.reference.ants import starts
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds import World
@@ -88,15 +86,11 @@ def test_ants_start_around_the_queen_or_anywhere() -> None:
         world.start(1, 2, "moon")
 
 
-def test_spread_ants_take_free_cells_by_a_hash_of_their_rank() -> None:
-    world = World((5, 4, 6), (0, 0, 0), foods=[(1, 0, 0)])
-    cells = sorted(map(tuple, world.grid.cells(np.flatnonzero(world.grid.exists)).tolist()))
-    words = {cell: stream_state(9, STREAM_START_CELL, rank) for rank, cell in enumerate(cells)}
-    free = world.ground() == EMPTY
-    expected = sorted((cell for cell in cells if free[world.grid.index(cell)]), key=words.get)
-    for n in (0, 1, 7, len(expected)):
-        taken = free_cells(world.grid, free, world.queens, np.zeros(n, int), 9, "spread")
-        assert list(map(tuple, world.grid.cells(taken).tolist())) == expected[:n]
+@pytest.mark.parametrize("where", WHERE)
+def test_no_ants_need_no_free_cell(where: str) -> None:
+    world = small()
+    full, none = np.zeros(world.grid.size, bool), np.zeros(0, int)
+    assert not len(free_cells(world.grid, full, world.queens, none, 0, where))
 
 
 @st.composite
