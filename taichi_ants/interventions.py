@@ -67,7 +67,7 @@ class ShorthandSettings(Settings):
         values = value if settings.is_table(value) else cls._short(value)
         if values is None:
             return value
-        return cls(**cls._required(values) | values)
+        return cls(**{**cls._required(values), **values})
 
     @classmethod
     def _short(cls, value: Any) -> dict[str, Any] | None:

@@ -495,8 +495,8 @@ def is_table(value: object) -> TypeGuard[Mapping[str, Any]]:
     return isinstance(value, Mapping) and all(isinstance(name, str) for name in value)
 
 
-def table_of(path: str, values: Any) -> dict[str, Any]:
-    """Return a table of settings, or pairs of a name and a value, as a dict; else AntsError."""
+def table_of(path: str, values: Any) -> Mapping[str, Any]:
+    """Return a table of settings, or pairs of a name and a value, as a table; else AntsError."""
     with suppress(TypeError, ValueError):
         if is_table(table := dict(values)):
             return table

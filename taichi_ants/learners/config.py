@@ -87,14 +87,14 @@ class TrainingConfig(Settings, path="training"):
         for setting in declared(TrainingConfig):
             object.__setattr__(self, setting.name, values[setting.name])
         self.check()
-        pairs = table_of("training.hyperparameters", hyperparameters) | more
+        pairs = {**table_of("training.hyperparameters", hyperparameters), **more}
         plain = {n: v.item() if getattr(v, "size", 0) == 1 else v for n, v in pairs.items()}
         object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
 
     @classmethod
     def from_dict(cls, facts: Any) -> TrainingConfig:
         """Return the configuration in a mapping, which can have hyperparameters, too."""
-        return cls(**cls._required(facts) | facts)
+        return cls(**{**cls._required(facts), **facts})
 
     @classmethod
     def frozen(cls, epsilon: float = 0.0) -> TrainingConfig:
