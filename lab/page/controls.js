@@ -57,7 +57,7 @@ export class Controls {
   constructor(lab) {
     this.lab = lab;
     this.build();
-    this.radios(byId("speeds"), SPEEDS.map((speed) => [speed, speed === 0.5 ? "½×" : `${speed}×`, `Speed ${speed}`]),
+    this.markSpeed = this.radios(byId("speeds"), SPEEDS.map((speed) => [speed, speed === 0.5 ? "½×" : `${speed}×`, `Speed ${speed}`]),
                 () => lab.ui.speed, (speed) => { lab.ui.speed = speed; });
     this.radios(byId("brushes"), BRUSHES.map(([id, word, label]) => [id, `${icon(id)}${word && `<span class="name">${word}</span>`}`, label]),
                 () => lab.ui.brush, (brush) => lab.choose(brush));
@@ -149,6 +149,7 @@ export class Controls {
       next.focus();
     });
     mark();
+    return mark;
   }
 
   key(event) {

@@ -30,6 +30,7 @@ export class Painter {
     const margin = 6 * this.dpr, R = e.radius - 1;
     this.s = Math.min((w - 2 * margin) / (3 * R + 2), (h - 2 * margin) / (2 * ROOT3 * R + 1.9)); // pixels per unit
     [this.x0, this.y0] = [w / 2, h / 2];
+    this.headroom = (h / 2 + (ROOT3 * R + 2) * this.s) / this.dpr; // CSS pixels from the bottom to the top of the world
     this.scent.width = this.scent.height = e.width;
     this.bloom.width = this.bloom.height = Math.ceil(e.width / 3);
     this.image = this.scent.getContext("2d").createImageData(e.width, e.width);

@@ -1,11 +1,17 @@
 /* main.js: the lab: time, the runs in view, and what the page says about them. */
 
+import { Address } from "./address.js";
 import { Brush } from "./brush.js";
 import { byId, Controls, icon } from "./controls.js";
+import { Daily } from "./daily.js";
 import { Painter } from "./draw.js";
+import { Embed } from "./embed.js";
+import { Film } from "./film.js";
+import { STEPS } from "./engine.js";
 import { mindOf } from "./mind.js";
 import { Plot } from "./plot.js";
 import { Run, TICKS_A_SECOND } from "./run.js";
+import { QUESTIONS, questionStory, settle } from "./scenes.js";
 import { many, storyOf } from "./story.js";
 import { SCENE } from "./worlds.js";
 
@@ -13,6 +19,17 @@ import { SCENE } from "./worlds.js";
 const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 const MOST_TICKS_MS = 22; // of a frame; ticks that do not fit are dropped
 const WORDS_MS = 100;     // between two changes of words
+
+/** The events of an engine without its last stroke, whose pieces follow each other. */
+function withoutLastStroke({ events, width }) {
+  let first = events.length - 1;
+  while (first >= 0 && !("path" in events[first])) first--;
+  const joins = (piece, next) => piece && piece.path && piece.do === next.do && piece.reach === next.reach
+    && STEPS.some(([q, r]) => piece.path[piece.path.length - 1] + q + r * width === next.path[0]);
+  let from = first;
+  while (from > 0 && joins(events[from - 1], events[from])) from--;
+  return first < 0 ? events : [...events.slice(0, from), ...events.slice(first + 1)];
+}
 
 class Lab {
   constructor() {
@@ -28,22 +45,38 @@ class Lab {
     this.plot = new Plot(byId("plot"));
     this.frames = []; // [ms at which a frame began, ms of drawing]
     [this.owed, this.last, this.told, this.wordsAt, this.minds] = [0, 0, "", 0, 0];
-    this.begin([{ scene: SCENE }]);
+    this.begin();
     this.controls = new Controls(this);
+    this.address = new Address(this);
+    this.film = new Film(this);
+    this.daily = new Daily(this);
     this.brushes = this.sides.map((side) => new Brush(this, side));
     new ResizeObserver(() => { this.fits = false; }).observe(byId("views"));
+    byId("questions").innerHTML = "<h2>What do you expect?</h2>"
+      + QUESTIONS.map(({ id, title }) => `<button data-question="${id}">${title}</button>`).join("")
+      + '<button data-question="daily">Today’s map: ten rocks, most food wins</button>';
+    byId("questions").addEventListener("click", ({ target }) => {
+      if (target.dataset.question) this.address.open(target.dataset.question);
+      if (target.dataset.question) scrollTo({ top: 0, behavior: this.ui.still ? "auto" : "smooth" });
+    });
+    byId("options").addEventListener("click", ({ target }) => { if (target.dataset.say) this.say(Number(target.dataset.say)); });
     byId("learned").addEventListener("click", () => this.showMind(true));
     byId("mind").addEventListener("click", (event) => this.mindClick(event));
   }
 
   get runs() { return this.sides.filter((side) => side.run).map((side) => side.run); }
 
-  /** Start one run, or two next to each other. @param {{scene: any, events?: any[], label?: string}[]} starts */
-  begin(starts) {
+  /**
+   * Start one run, or two next to each other.
+   * @param {{scene: any, events?: any[], label?: string, skip?: number}[]} starts
+   */
+  begin(starts = [{ scene: SCENE }], question = null) {
+    this.question = question;
     this.sides.forEach((side, k) => {
       const start = starts[k];
       side.view.hidden = !start;
       side.run = start ? new Run(this.module, start.scene, start.events) : null;
+      if (start && start.skip) side.run.skip(start.skip);
       side.caption.hidden = !start || !start.label;
       side.caption.innerHTML = start && start.label || "";
       const what = starts.length > 1 ? `The ${k ? "right" : "left"} world` : "The world";
@@ -52,28 +85,62 @@ class Lab {
     });
     byId("views").classList.toggle("two", starts.length > 1);
     byId("other").hidden = starts.length < 2;
+    byId("unit").innerHTML = starts.length < 2 ? "food per <br>minute" : "right, food <br>per minute";
     Object.assign(this.ui, { followed: -1, hero: -1, ghost: null });
+    byId("undo").disabled = true;
     this.plot.reset();
     [this.told, this.owed, this.fits] = ["", 0, false];
-    if (this.controls) this.controls.show();
+    if (!this.controls) return;
+    this.controls.show();
+    for (const button of byId("questions").children) button.setAttribute("aria-current", String(button.dataset.question === (question || {}).id));
+  }
+
+  /** Ask for a prediction; the runs wait until the visitor has said one. */
+  ask(question) {
+    this.begin(question.sides, { ...question, said: -1, found: null });
+    this.address.name(question.id);
+    this.ui.speed = question.speed;
+    this.controls.markSpeed();
+    this.play(false);
+  }
+
+  /** A button below the story was pressed: a prediction, or what comes after the answer. */
+  say(k) {
+    const { question } = this;
+    if (!question) return k === 0 ? this.daily.begin(this.runs[0].scene.seed) : undefined;
+    if (question.said < 0) question.said = k;
+    else if (k === 0) return this.ask(questionStory(question, this.runs).next);
+    else this.home();
+    return this.play(true);
+  }
+
+  /** The first screen. */
+  home() {
+    this.begin();
+    this.ui.speed = 1;
+    this.controls.markSpeed();
+    this.address.name("");
   }
 
   /** Start again, with the present settings and these changes; nothing that was drawn is kept. */
   restart(changes = {}) {
     const last = this.runs.length - 1;
+    if (this.question && !Object.keys(changes).length) return this.ask(this.question);
     this.begin(this.runs.map((run, k) => ({
       scene: { ...run.engine.scene, ...(k === last ? changes : {}) }, label: this.sides[k].caption.innerHTML,
     })));
-    this.play(true);
+    this.address.save();
+    return this.play(true);
   }
 
   /** A change by the visitor; whatever a replay still holds is dropped. */
   act(event) {
     for (const run of this.runs) {
       run.engine.forget();
-      run.apply({ ...event });
+      run.apply(event);
     }
     byId("undo").disabled = false;
+    this.address.save();
   }
 
   /** Change a setting; of two runs, that of the right one. */
@@ -82,16 +149,40 @@ class Lab {
     run.engine.forget();
     run.apply({ do: name, value });
     this.controls.show();
+    this.address.save();
   }
 
-  mayDraw() { return true; }
+  mayDraw() {
+    const [run] = this.runs;
+    if (!Daily.is(run) || this.ui.brush !== "rock" || this.daily.mayDraw(run)) return true;
+    this.toast(run.tick < 2000 ? "All ten rocks are placed." : "The time is over. Start again to play.");
+    return false;
+  }
 
-  undo() {}
+  /** Play the runs again without their last stroke, up to now: as if it had never been drawn. */
+  undo() {
+    const starts = this.runs.map((run) => ({ run, events: withoutLastStroke(run.engine) }));
+    if (!starts.some(({ run, events }) => events.length < run.engine.events.length)) return;
+    const marks = this.plot.marks, { question } = this, captions = this.sides.map((side) => side.caption.innerHTML);
+    const [moments, begun] = [starts.map(({ run }) => run.tick), starts.map(({ run }) => [run.start, run.earned])];
+    this.begin(starts.map(({ run, events }, k) => ({ scene: run.engine.first, events, label: captions[k] })), question);
+    this.runs.forEach((run, k) => {
+      run.skip(moments[k]);
+      [run.start, run.earned] = begun[k];
+    });
+    this.plot.marks = marks.filter(({ word }) => word === "lanes");
+    byId("undo").disabled = !this.runs.some((run) => withoutLastStroke(run.engine).length < run.engine.events.length);
+    this.toast("Played again without your last stroke.");
+    this.controls.show();
+    this.address.save();
+  }
 
   play(on) {
+    if (on && this.question && this.question.said < 0) return this.toast("First say what you expect.");
     this.ui.playing = on;
     byId("play").innerHTML = icon(on ? "pause" : "play");
     byId("play").setAttribute("aria-label", on ? "Pause" : "Play");
+    return undefined;
   }
 
   choose(brush) {
@@ -107,7 +198,11 @@ class Lab {
   }
 
   fit() {
-    for (const { painter, run } of this.sides) if (run) painter.fit(run, this.ui.theme);
+    for (const { painter, run, caption } of this.sides) {
+      if (!run) continue;
+      painter.fit(run, this.ui.theme);
+      caption.style.bottom = `${painter.headroom}px`;
+    }
     const style = getComputedStyle(document.documentElement);
     this.colours = Object.fromEntries(["text", "soft", "line", "accent"].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
     this.fits = true;
@@ -118,11 +213,12 @@ class Lab {
       run.advance();
       this.note(run);
     }
+    if (this.question) settle(this.question, this.runs);
   }
 
   /** Mark in the plot what happened in this tick. */
   note(run) {
-    if (run !== this.runs[this.runs.length - 1]) return;
+    if (run !== this.runs[this.runs.length - 1] || this.question) return;
     const { facts, wall, tick } = run;
     if (facts.lanes === tick) this.plot.mark(tick, "lanes");
     if (wall && wall.tick === tick - 1) this.plot.mark(wall.tick, "wall");
@@ -145,6 +241,7 @@ class Lab {
     const began = performance.now();
     for (const { painter, run } of this.sides) if (run) painter.frame(ui.speed > 3 ? 1 : this.owed, passed, ui);
     this.firstFrame ||= performance.now(); // ms since the page was opened
+    this.film.add();
     this.frames.push([now, performance.now() - began]);
     if (this.frames.length > 120) this.frames.shift();
     if (now - this.wordsAt > WORDS_MS) {
@@ -154,7 +251,8 @@ class Lab {
   }
 
   words() {
-    const { ui } = this, runs = this.runs, run = runs[runs.length - 1], told = storyOf(run);
+    const { ui } = this, runs = this.runs, run = runs[runs.length - 1];
+    const told = this.question ? questionStory(this.question, runs) : Daily.is(run) ? this.daily.story(run) : storyOf(run);
     if (told.id !== this.told) {
       this.told = told.id;
       this.restartAnimation(told);
@@ -196,8 +294,8 @@ class Lab {
     }
     byId("mind").innerHTML = '<button class="back">← Settings</button><h2>What they learned</h2>'
       + '<div class="group" role="radiogroup" aria-label="Arrows of the best actions" id="arrows"></div><div class="mind" id="table"></div>';
-    this.controls.radios(byId("arrows"), [["", "No arrows", "No arrows"], ["empty", "Without food", "Arrows of ants without food"],
-                                          ["loaded", "With food", "Arrows of ants with food"]],
+    this.controls.radios(byId("arrows"), [["", "No arrows", "No arrows"], ["empty", "Searching", "Arrows of ants without food"],
+                                          ["loaded", "Carrying", "Arrows of ants with food"]],
                          () => this.ui.arrows, (arrows) => { this.ui.arrows = arrows; });
     byId("table").innerHTML = mindOf(this.runs[this.runs.length - 1], this.ui);
     byId("mind").querySelector("button").focus();
@@ -224,5 +322,7 @@ class Lab {
 const lab = new Lab();
 lab.play(true);
 lab.setTheme(/theme=light/.test(location.search) ? "light" : "dark"); // light scent needs dark ground
+lab.address.open();
+new Embed(lab);
 Object.assign(window, { lab });
 requestAnimationFrame((now) => lab.frame(now));

@@ -28,14 +28,15 @@ export class Plot {
     }
     x.setTransform(dpr, 0, 0, dpr, 0, 0);
     x.clearRect(0, 0, w, h);
-    const last = runs[0].tick, span = Math.max(SHORTEST, Math.min(last, LONGEST)), from = Math.max(0, last - span);
-    const first = Math.ceil(from / TICKS_A_SECOND), count = Math.floor(last / TICKS_A_SECOND) - first + 1;
-    const ticks = Array.from({ length: Math.max(0, count) }, (_, k) => (first + k) * TICKS_A_SECOND);
-    const lines = runs.map((run) => ticks.filter((t) => t < run.total.length).map((t) => [t, run.perMinuteAt(t)]));
+    const last = runs[0].tick, first = runs[0].start, span = Math.max(SHORTEST, Math.min(last - first, LONGEST));
+    const from = Math.max(first, last - span);
+    const points = Math.floor((last - from) / TICKS_A_SECOND) + 1, ticks = Array.from({ length: points }, (_, k) => k * TICKS_A_SECOND);
+    // Runs may have started at different ticks; they are compared from there.
+    const lines = runs.map((run) => ticks.map((t) => [from + t, run.perMinuteAt(run.start - first + from + t)]));
     const wanted = Math.max(120, Math.ceil(Math.max(0, ...lines.flat().map(([, v]) => v)) / 60) * 60);
     this.most = wanted > this.most ? wanted : this.most + (wanted - this.most) * 0.12;
     const bottom = h - BELOW, px = (t) => (t - from) / span * (w - 2) + 1, py = (v) => bottom - v / this.most * (bottom - TOP);
-    this.drawAxes(x, w, h, py, from, span, colours);
+    this.drawAxes(x, w, h, py, from - first, span, colours);
     const follow = (points) => points.forEach(([t, v], k) => (k ? x.lineTo(px(t), py(v)) : x.moveTo(px(t), py(v))));
     if (ticks.length > 1) {
       this.shade(x, lines, bottom, follow, px, colours);

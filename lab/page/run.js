@@ -13,7 +13,7 @@ const SAME_STROKE = 40;                // ticks between the pieces of a wall
 const STOPPED = 450;                   // ticks without a detour
 const DETOUR = 10;                     // loads that come round a wall
 const MOST_SPARKS = 80;
-const PICKED_UP = EVENTS.indexOf("picked up"), DELIVERED = EVENTS.indexOf("delivered");
+const PICKED_UP = EVENTS.pickedUp, DELIVERED = EVENTS.delivered;
 
 export class Run {
   /** @param {object} scene see SCENE in worlds.js  @param {object[]} events a replay, see engine.js */
@@ -28,6 +28,7 @@ export class Run {
     this.visits = new Int32Array(e.values.length / 8); // how often an ant was in a state
     this.sparks = [];                                  // pick-ups and deliveries, which the drawing shows for a moment
     this.seen = 0;                                     // events that are noted
+    [this.start, this.earned] = [0, 0];                // the tick at which somebody began to watch, and the returns then
   }
 
   get tick() { return this.engine.tick; }
@@ -60,10 +61,11 @@ export class Run {
     if (wall && wall.crossed && wall.detour < 0 && tick - wall.last >= STOPPED) wall.stopped = true;
   }
 
-  /** Pass ticks that nobody watches; only the first facts and the counter are kept. */
-  skip(ticks) {
-    for (let k = 0; k < ticks; k++) this.advance();
+  /** Pass ticks that nobody watches, up to a tick. */
+  skip(tick) {
+    while (this.tick < tick) this.advance();
     this.sparks = [];
+    [this.start, this.earned] = [this.tick, this.engine.returns];
   }
 
   noteAnts() {
