@@ -19,7 +19,7 @@ MOST_BYTES = 400_000
 # In this order: each module uses only those before it while it is loaded.
 MODULES = (
     *("worlds", "engine", "link", "geometry", "looks", "run", "story", "shapes", "draw", "plot", "mind", "scenes"),
-    *("daily", "brush", "controls", "address", "film", "embed", "main"),
+    *("daily", "brush", "controls", "train", "address", "film", "embed", "main"),
 )
 FONTS = (("Newsreader", "500", "newsreader.woff2"), ("Inter", "400 650", "inter.woff2"))
 BINARIES = {"COLONY": "colony.wasm", "ANT": "ant.wasm"}

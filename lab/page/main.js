@@ -13,9 +13,10 @@ import { Plot } from "./plot.js";
 import { Run, TICKS_A_SECOND } from "./run.js";
 import { QUESTIONS, questionStory, settle } from "./scenes.js";
 import { many, storyOf } from "./story.js";
+import { Training } from "./train.js";
 import { SCENE } from "./worlds.js";
 
-/* global COLONY_WASM */
+/* global COLONY_WASM, ANT_WASM */
 const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 const MOST_TICKS_MS = 22; // of a frame; ticks that do not fit are dropped
 const WORDS_MS = 100;     // between two changes of words
@@ -50,11 +51,12 @@ class Lab {
     this.address = new Address(this);
     this.film = new Film(this);
     this.daily = new Daily(this);
+    this.training = new Training(this, bytesOf(ANT_WASM));
     this.brushes = this.sides.map((side) => new Brush(this, side));
     new ResizeObserver(() => { this.fits = false; }).observe(byId("views"));
     byId("questions").innerHTML = "<h2>What do you expect?</h2>"
       + QUESTIONS.map(({ id, title }) => `<button data-question="${id}">${title}</button>`).join("")
-      + '<button data-question="daily">Today’s map: ten rocks, most food wins</button>';
+      + '<button data-question="daily">Today’s map: ten rocks</button><button id="train">One ant, alone: learning curves</button>';
     byId("questions").addEventListener("click", ({ target }) => {
       if (target.dataset.question) this.address.open(target.dataset.question);
       if (target.dataset.question) scrollTo({ top: 0, behavior: this.ui.still ? "auto" : "smooth" });

@@ -73,8 +73,8 @@ export const QUESTIONS = [
     answer: ([left, right]) => {
       const ratio = right.food / Math.max(1, left.food);
       return { right: ratio > 1.25 ? 2 : ratio < 0.8 ? 0 : 1, head: ratio > 1.25 ? "The left trail points home." : "It hardly mattered.",
-               sub: `Right: ${bold(more(right.food, left.food))} food. Who follows the scent uphill on the left walks after the ants with food, `
-                 + "to the nest, where nothing is to be found." };
+               sub: `Right: ${bold(more(right.food, left.food))} food. On the left, an ant that follows the scent uphill walks after ants with food, `
+                 + "to the nest, where no food is." };
     },
   },
   {
@@ -111,7 +111,7 @@ export const QUESTIONS = [
     answer: ([left, right]) => {
       const ratio = right.food / Math.max(1, left.food);
       return { right: ratio > 1.1 ? 0 : ratio < 0.9 ? 2 : 1, head: `${many(right.food)} against ${many(left.food)}.`,
-               sub: "Who tries more finds food no later, but loses the way more often. Now change any setting: it holds for the right half only." };
+               sub: "Random steps find food, and lose the way. Now change any setting: it applies to the right half only." };
     },
   },
 ];
