@@ -1,6 +1,7 @@
 """Build colony.wasm and ant.wasm from C, with clang and lld: python lab/engine/build.py
 
-It also writes the tables of lab/page/worlds.js from the package: worlds and the hand-written policy.
+It also writes the tables of lab/page/worlds.js from the package: the worlds, and the best actions
+of the hand-written policy.
 
 The files are committed, with their checksums and the compiler in built.json, so that a page needs
 no compiler. Other compilers make other bytes with the same results, which tests compare.

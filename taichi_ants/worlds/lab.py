@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.errors import check_one_of
+from taichi_ants.errors import checked_whole
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.worlds.world import World
 
@@ -85,7 +85,7 @@ def lab_world(number: int, seed: int = 0) -> World:
     Raises:
         AntsError: There is no such world.
     """
-    check_one_of("the number of the world", number, tuple(range(len(WORLDS))))
+    checked_whole("the number of the world", number, 0, len(WORLDS) - 1)
     lab = WORLDS[number]
     grid = AxialGrid((lab.radius,) * 3)
     r, q = (each - lab.radius for each in np.divmod(np.arange(grid.size), grid.width))
