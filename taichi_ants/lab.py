@@ -1,27 +1,13 @@
 """Replay links of the lab, the page in `docs/lab.html`, where the same ants run in WebAssembly.
 
 A link is `CODE;TICK;HASH`: a code, the tick at which it was copied, and a hash of the state then.
-The code is base64 for addresses of the bytes below. A number has seven bits in each byte, the
-lowest first; all but its last byte are above 127.
-
-    version; world | learner << 4; rules
-    seed, ants, 1000 epsilon, 1000 learning rate, 1000 discount, learns, first value *, level,
-    1 + regrowth, shaping *
-    events: ticks since the event before; then
-      kind | reach << 3 for a stroke, its first cell, and bytes kind | n << 3:
-        0 .. 5: n + 1 steps along this heading; 6: a wait of n + 1 ticks; 7: the end
-      4 | setting << 3 for a setting, and its value
-
-Numbers marked * can be negative: n is written as 2 n, or -2 n - 1. Each part of a stroke between
-waits is an event, which paints all cells within `reach` of its own cells.
+For the code, see `lab/page/link.js`, which writes it.
 """
 
 from __future__ import annotations
 
 import base64
-import binascii
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 from urllib.parse import unquote
 
@@ -35,29 +21,28 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference.random_stream import hash_of
 from taichi_ants.task import Task, queueing
-from taichi_ants.worlds.lab import STEPS, WORLDS, lab_world
+from taichi_ants.worlds.lab import STEPS, WORLDS, distance, lab_world
 
-VERSION = 1
 STROKES = ("rock", "food", "scent", "erase")
 SETTINGS = ("ants", "epsilon", "rate", "discount", "level", "shaping", "learns")
 LEARNERS = ("q_learning", "sarsa", "frozen")
-DIRECTED, RIGHT_OF_WAY, SEES_ANTS, QUEUES = 1, 2, 4, 8  # bits of rules
-RULES = (*range(8), 15)
-THOUSANDTHS, SIGNED = ("epsilon", "rate", "discount"), ("first", "shaping")
-MOST_TICKS, MOST_ANTS = 1_000_000, 10_000
-_SETTING, _WAIT, _END = 4, 6, 7
-_SCENE = (
-    *("seed", "ants", "epsilon", "rate", "discount", "learns", "first", "level", "regrowth"),
-    "shaping",
-)
-_MOST = {
-    **{"seed": 2**53 - 1, "ants": MOST_ANTS, "epsilon": 1000, "rate": 1000, "discount": 1000},
-    **{"learns": 1, "first": 1000, "level": 100_000, "regrowth": MOST_TICKS, "shaping": 100},
+RULES, DIRECTED, QUEUES = (*range(8), 15), 1, 8
+PARTS: dict[int, dict[str, Any]] = {  # of `foraging`, by the bit of rules
+    DIRECTED: {"pheromone": {"deposit": "fading", "view": "strongest"}},
+    2: {"traffic": "right_of_way"},
+    4: {"observation": "ants"},
 }
+RANGES = {  # of the numbers of a scene, in the order of the code
+    **{"seed": (0, 2**53 - 1), "ants": (1, 10_000), "epsilon": (0, 1000), "rate": (0, 1000)},
+    **{"discount": (0, 1000), "learns": (0, 1), "first": (-1000, 1000), "level": (1, 100_000)},
+    **{"regrowth": (-1, 1_000_000), "shaping": (-100, 100)},
+}
+MOST_TICKS = 1_000_000
+_VERSION, _SETTING, _WAIT, _END = 1, 4, 6, 7
 
 
 class Event(NamedTuple):
-    """A change of a visitor before a tick: a stroke with its cells (q, r), or a setting."""
+    """A change before a tick: the value of a setting, or a stroke along cells (q, r)."""
 
     tick: int
     does: str
@@ -66,23 +51,8 @@ class Event(NamedTuple):
     path: tuple[tuple[int, int], ...] = ()
 
 
-class Visit(NamedTuple):
-    """What a code has: settings of the scene by name, and events by tick."""
-
-    scene: dict[str, Any]
-    events: list[Event]
-
-
-@dataclass(frozen=True)
-class Replayed:
-    """The result of a link that was replayed.
-
-    Attributes:
-        tick: The number of ticks.
-        deliveries: Food items that ants have delivered.
-        hash: The hash of the state: tick, ants, ground, trail and action values.
-        expected_hash: The hash in the link, which the page computed.
-    """
+class Replayed(NamedTuple):
+    """The result of a link: ticks, food items delivered, and the hashes of package and page."""
 
     tick: int
     deliveries: int
@@ -91,198 +61,175 @@ class Replayed:
 
     @property
     def equal(self) -> bool:
-        """Whether page and package agree."""
+        """Whether package and page agree."""
         return self.hash == self.expected_hash
 
 
 def replay(link: str) -> Replayed:
-    """Return the result of a link of the lab, replayed by a `Colony`.
+    """Return the result of a link of the lab, which a `Colony` replays.
 
-    The link is an address that "Copy link" made, or its part after "#".
+    The link is an address that the lab has copied, or its part after "#".
 
     Raises:
         AntsError: The link is damaged, or is not one of the lab.
     """
     expect("link", link, str)
-    code, *rest = unquote(link).rpartition("#")[2].strip().split(";")
     try:
-        tick, expected = int(rest[0]), f"{int(rest[1], 16):016x}"
-        visit = decoded(code)
-        if not max((event.tick for event in visit.events), default=0) <= tick <= MOST_TICKS:
-            raise ValueError
-    except (ValueError, IndexError, binascii.Error) as error:
+        code, ticks, page_hash = unquote(link).rpartition("#")[2].strip().split(";")
+        scene, events = decoded(code)
+        tick, expected = int(ticks), f"{int(page_hash, 16):016x}"
+        if not max((event.tick for event in events), default=0) <= tick <= MOST_TICKS:
+            raise ValueError("it ends before its last event, or late")
+    except (ValueError, IndexError) as error:
         raise AntsError(
-            "the link is damaged, or is not one of the lab; copy it again with its tick and hash, "
-            "CODE;TICK;HASH."
+            "the link is damaged, or is not one of the lab; copy it there again, with its tick and "
+            "hash."
         ) from error
-    colony = _begun(visit)
-    to, scene = Interventions(colony, lasting=False), dict(visit.scene)
-    for event in visit.events:
+    ants = [scene["ants"], *(int(event.value) for event in events if event.does == "ants")]
+    colony = _begun(scene, max(ants))
+    to = Interventions(colony, lasting=False)
+    for event in (*events, Event(tick, "end")):
         if event.tick > colony.ticks:
             colony.tick(event.tick - colony.ticks)
         for change in _changes(event, scene, colony):
             to.apply(change)
-    if tick > colony.ticks:
-        colony.tick(tick - colony.ticks)
     return Replayed(tick, int(colony.deliveries[0]), state_hash(colony), expected)
 
 
-def decoded(code: str) -> Visit:
-    """Return what a code has; ValueError or IndexError if it is damaged."""
-    raw = iter(base64.b64decode(code + "=" * (-len(code) % 4), "-_", validate=True))
-    version, both, rules = (next(raw, -1) for _ in range(3))
-    scene: dict[str, Any] = {"world": both & 15, "learner": both >> 4, "rules": rules}
-    if version != VERSION or both < 0 or scene["world"] >= len(WORLDS):
-        raise ValueError
-    if rules not in RULES or scene["learner"] >= len(LEARNERS):
-        raise ValueError
-    for name in _SCENE:
-        scene[name] = _number(raw, name)
-    events, tick = [], 0
-    while (first := next(raw, None)) is not None:
-        tick += _varint(raw, first)
-        head = _byte(raw)
-        if head & 7 == _SETTING:
-            name = SETTINGS[head >> 3]
-            events.append(Event(tick, name, _number(raw, name)))
+def decoded(code: str) -> tuple[dict[str, Any], list[Event]]:
+    """Return the scene and the events of a code; ValueError or IndexError if it is damaged."""
+    raw = _Reader(base64.b64decode(code + "=" * (-len(code) % 4), "-_", validate=True))
+    version, both, rules = raw.byte(), raw.byte(), raw.byte()
+    scene: dict[str, Any] = {"world": both & 15, "learner": LEARNERS[both >> 4], "rules": rules}
+    radius, events, tick = WORLDS[scene["world"]]["radius"], list[Event](), 0
+    if version != _VERSION or rules not in RULES:
+        raise ValueError("it is of another version")
+    scene |= {name: raw.setting(name) for name in RANGES}
+    while raw.at < len(raw.code):
+        tick += raw.number()
+        kind, more = raw.pair()
+        if kind == _SETTING:
+            events.append(Event(tick, SETTINGS[more], raw.setting(SETTINGS[more])))
         else:
-            events += _stroke(
-                raw, tick, STROKES[head & 7], head >> 3, WORLDS[scene["world"]].radius
-            )
+            events += raw.stroke(tick, STROKES[kind], more, radius)
             tick = events[-1].tick
-    return Visit(scene, events)
+    return scene, events
 
 
-def _byte(raw: Iterator[int]) -> int:
-    if (byte := next(raw, None)) is None:
-        raise ValueError
-    return byte
+class _Reader:
+    """The bytes of a code, which are read one after the other."""
+
+    def __init__(self, code: bytes) -> None:
+        self.code, self.at = code, 0
+
+    def byte(self) -> int:
+        self.at += 1
+        return self.code[self.at - 1]
+
+    def pair(self) -> tuple[int, int]:
+        """Return the three low bits of a byte, and the others."""
+        return (byte := self.byte()) & 7, byte >> 3
+
+    def number(self) -> int:
+        number, unit, byte = 0, 1, 128
+        while byte > 127:
+            byte = self.byte()
+            number, unit = number + (byte & 127) * unit, unit * 128
+        return number
+
+    def setting(self, name: str) -> float:
+        """Return the value of a setting; ValueError if it is not allowed."""
+        number, (least, most) = self.number(), RANGES[name]
+        if least < -1:  # it has a sign
+            number = -(number + 1) // 2 if number % 2 else number // 2
+        number -= name == "regrowth"
+        if not least <= number <= most:
+            raise ValueError(f"{name} is {number}")
+        return number / 1000 if name in ("epsilon", "rate", "discount") else number
+
+    def stroke(self, tick: int, does: str, reach: int, radius: int) -> Iterator[Event]:
+        """Yield the events of a stroke, one for each part between waits."""
+        r, q = (one - radius for one in divmod(self.number(), 2 * radius + 1))
+        path, kind = [(q, r)], 0
+        while kind != _END:
+            kind, n = self.pair()
+            for _ in range((n + 1) * (kind < _WAIT)):
+                q, r = q + STEPS[kind][0], r + STEPS[kind][1]
+                path.append((q, r))
+            if max((distance(*cell) for cell in path), default=0) >= radius:
+                raise ValueError("a stroke leaves the world")
+            if kind >= _WAIT and path:
+                yield Event(tick, does, reach=reach, path=tuple(path))
+                path = []
+            tick += (n + 1) * (kind == _WAIT)
 
 
-def _varint(raw: Iterator[int], byte: int) -> int:
-    number, unit = byte & 127, 128
-    while byte > 127:
-        byte = _byte(raw)
-        number, unit = number + (byte & 127) * unit, unit * 128
-    if number > _MOST["seed"]:
-        raise ValueError
-    return number
-
-
-def _number(raw: Iterator[int], name: str) -> float:
-    """Return the number of a setting; ValueError if it is not allowed."""
-    number: float = _varint(raw, _byte(raw))
-    if name in SIGNED:
-        number = number // 2 if number % 2 == 0 else -(number + 1) // 2
-    number -= name == "regrowth"
-    least = 1 if name in ("ants", "level") else -_MOST[name] if name in SIGNED else -1
-    if not least <= number <= _MOST[name]:
-        raise ValueError
-    return number / 1000 if name in THOUSANDTHS else number
-
-
-def _stroke(raw: Iterator[int], tick: int, does: str, reach: int, radius: int) -> list[Event]:
-    """Return the events of a stroke, one for each part between waits."""
-    width = 2 * radius + 1
-    r, q = (one - radius for one in divmod(_varint(raw, _byte(raw)), width))
-    events, path = [], [(q, r)]
-    while True:
-        kind, n = (byte := _byte(raw)) & 7, (byte >> 3) + 1
-        if kind >= _WAIT and path:
-            events.append(Event(tick, does, reach=reach, path=tuple(path)))
-            path = []
-        if kind == _END:
-            break
-        if kind == _WAIT:
-            tick += n
-            continue
-        for _ in range(n):
-            q, r = q + STEPS[kind][0], r + STEPS[kind][1]
-            path.append((q, r))
-    if any(_far(*cell) >= radius for event in events for cell in event.path):
-        raise ValueError
-    return events
-
-
-def _far(q: int, r: int) -> int:
-    """Return the distance of a cell from the middle of the world."""
-    return max(q, r, 0) - min(q, r, 0)
-
-
-def _task(scene: dict[str, Any]) -> Task:
-    """Return the task of a scene: the paper's, with parts of `foraging`, or `queueing`."""
-    rules, parts = scene["rules"], dict[str, Any]()
-    if rules & DIRECTED:
-        parts["pheromone"] = {"deposit": "fading", "view": "strongest"}
-    if rules & RIGHT_OF_WAY:
-        parts["traffic"] = "right_of_way"
-    if rules & SEES_ANTS:
-        parts["observation"] = "ants"
-    task = queueing() if rules & QUEUES else Task().replace(**parts)
-    regrowth = None if scene["regrowth"] < 0 else scene["regrowth"]
-    task = task.replace(evaporation_in_training=True, life={"regrowth": regrowth})
-    return task.replace(**_numbers(scene))
-
-
-def _numbers(scene: dict[str, Any]) -> dict[str, Any]:
-    """Return the settings of the task that visitors can change."""
-    level = int(scene["level"])
-    pheromone = {"level": level}
-    if scene["rules"] & DIRECTED:
-        pheromone["slope"] = max(1, (2 * level + 50) // 100)
-    return {"pheromone": pheromone, "rewards": {"shaping": int(scene["shaping"])}}
-
-
-def _begun(visit: Visit) -> Colony:
-    """Return the colony of a visit at the start of its episode."""
-    scene = visit.scene
-    world, task = lab_world(scene["world"], scene["seed"]), _task(scene)
-    frozen = LEARNERS[scene["learner"]] == "frozen"
-    config = TrainingConfig(
-        *("q_learning" if frozen else LEARNERS[scene["learner"]], max(scene["rate"], 0.001)),
-        *(scene["discount"], scene["epsilon"], 1.0, 0.0),
-        initial_q=scene["first"],
-    )
-    ants = [scene["ants"], *(event.value for event in visit.events if event.does == "ants")]
+def _begun(scene: dict[str, Any], capacity: int) -> Colony:
+    """Return the colony of a scene at the start of its episode."""
+    task = Task()
+    for bit, part in PARTS.items():
+        task = task.replace(**part) if scene["rules"] & bit else task
+    task = queueing() if scene["rules"] & QUEUES else task
+    life = {"regrowth": None if scene["regrowth"] < 0 else scene["regrowth"]}
+    task = task.replace(evaporation_in_training=True, life=life, **_numbers(scene))
+    learner, sharing, policy = scene["learner"], "shared", None
+    if learner == "frozen":
+        learner, sharing, policy = "q_learning", "frozen", trail_follower(task.observation)
+    numbers = max(scene["rate"], 0.001), scene["discount"], scene["epsilon"], 1.0, 0.0
     colony = Colony(
-        *(world, task, config, scene["seed"], int(scene["ants"]), int(max(ants))),
-        sharing="frozen" if frozen else "shared",
-        q_values=trail_follower(task.observation) if frozen else None,
+        lab_world(scene["world"], scene["seed"]),
+        task,
+        TrainingConfig(learner, *numbers, initial_q=scene["first"]),
+        *(scene["seed"], scene["ants"], capacity),
+        sharing=sharing,
+        q_values=policy,
     )
     colony.begin_episode()
-    if not frozen:
+    if colony.learns:
         colony.set_learning_rate(scene["rate"] * scene["learns"])
     return colony
 
 
+def _numbers(scene: dict[str, Any]) -> dict[str, Any]:
+    """Return the settings of the task that a visitor can change."""
+    pheromone = {"level": scene["level"]}
+    if scene["rules"] & DIRECTED:
+        pheromone["slope"] = max(1, (2 * scene["level"] + 50) // 100)
+    return {"pheromone": pheromone, "rewards": {"shaping": scene["shaping"]}}
+
+
 def _changes(event: Event, scene: dict[str, Any], colony: Colony) -> Iterator[changes.Intervention]:
-    """Yield the interventions of an event, and note its value in the scene."""
-    if event.does in STROKES:
-        grid, radius = colony.grid, WORLDS[scene["world"]].radius
-        around = range(-event.reach, event.reach + 1)
-        steps = [(q, r) for q in around for r in around if _far(q, r) <= event.reach]
-        near = {(q + a, r + b) for q, r in event.path for a, b in steps}
-        inside = sorted(cell for cell in near if _far(*cell) < radius)
-        cells = [(r + radius) * grid.width + q + radius for q, r in inside]
-        if event.does == "erase":
-            yield changes.Clear(cells)
-            yield changes.SetTrail(0, cells)
-        elif event.does == "scent":
-            yield changes.SetTrail((int(scene["level"]) + 1) // 2, cells)
-        else:
-            yield changes.Place(event.does, cells)  # type: ignore[arg-type]
-        return
-    scene[event.does] = event.value
-    if event.does == "ants":
-        yield changes.SetAnts(int(event.value))
-    elif event.does == "epsilon":
-        yield changes.SetEpsilon(event.value)
-    elif event.does == "discount":
-        colony.training = colony.training.replace(discount=event.value)
-    elif event.does in ("level", "shaping"):
-        yield changes.SetTask.from_dict(_numbers(scene))
-    elif colony.learns:
-        yield changes.SetLearningRate(scene["rate"] * scene["learns"])
+    """Yield the interventions of an event; the scene gets the value of a setting."""
+    if event.does in SETTINGS:
+        scene[event.does] = event.value
+    match event.does:
+        case "rock" | "food":
+            yield changes.Place(event.does, _cells(event, colony))
+        case "scent":
+            yield changes.SetTrail((scene["level"] + 1) // 2, _cells(event, colony))
+        case "erase":
+            yield changes.Clear(_cells(event, colony))
+            yield changes.SetTrail(0, _cells(event, colony))
+        case "ants":
+            yield changes.SetAnts(int(event.value))
+        case "epsilon":
+            yield changes.SetEpsilon(event.value)
+        case "discount":
+            colony.training = colony.training.replace(discount=event.value)
+        case "level" | "shaping":
+            yield changes.SetTask.from_dict(_numbers(scene))
+        case "rate" | "learns" if colony.learns:
+            yield changes.SetLearningRate(scene["rate"] * scene["learns"])
+
+
+def _cells(event: Event, colony: Colony) -> list[int]:
+    """Return the flat indices of the cells within reach of the path of a stroke."""
+    grid, around = colony.grid, range(-event.reach, event.reach + 1)
+    radius = grid.ranges[0]
+    disc = [(a, b) for a in around for b in around if distance(a, b) <= event.reach]
+    near = {(q + a, r + b) for q, r in event.path for a, b in disc}
+    inside = sorted(cell for cell in near if distance(*cell) < radius)
+    return [(r + radius) * grid.width + q + radius for q, r in inside]
 
 
 def state_hash(colony: Colony) -> str:
@@ -292,16 +239,15 @@ def state_hash(colony: Colony) -> str:
     and its random stream; for each cell its trail level and content; then all action values.
     """
     slots = np.flatnonzero(colony.living[0])
-    slots = slots[np.argsort(colony.numbers[0, slots], kind="stable")]
-    cells, headings, loads = (
-        np.asarray(of_ants)[0, slots].astype(np.uint64)
-        for of_ants in (colony.cells, colony.headings, colony.carrying)
+    slots = slots[np.argsort(colony.numbers[0, slots])]
+    cells, headings, loads, streams = (
+        column[0, slots].astype(np.uint64).tolist()
+        for column in (colony.cells, colony.headings, colony.carrying, colony.streams)
     )
-    eight, one = np.uint64(8), np.uint64(1)
-    ants = np.stack([cells << eight | headings << one | loads, colony.streams[0, slots]], axis=1)
+    ants = zip(cells, headings, loads, streams, strict=True)
+    words = [word for cell, h, load, s in ants for word in (cell << 8 | h << 1 | load, s)]
     stored, clock = colony.stored_pheromone(0, 0)
     levels = np.maximum(stored.astype(np.int64) - clock, 0)
-    ground = levels << 8 | (colony.part("ground", 0) & 15)
-    values = colony.q_values[0].view(np.uint32)
-    words = [colony.ticks, *ants.ravel().tolist(), *ground.tolist(), *values.ravel().tolist()]
-    return f"{hash_of(*words):016x}"
+    words += (levels << 8 | (colony.part("ground", 0) & 15)).tolist()
+    words += colony.q_values[0].view(np.uint32).ravel().tolist()
+    return f"{hash_of(colony.ticks, *words):016x}"

@@ -1,4 +1,20 @@
-// Links: a scene and all that a visitor did, as text for an address; taichi_ants/lab.py has the format.
+/* Links: a scene and all that a visitor did, as text for an address: CODE;TICK;HASH, with the tick
+ * at which it was copied and the hash of the state then. taichi_ants/lab.py replays them.
+ *
+ * The code is base64 for addresses of the bytes below. A number has seven bits in each byte, the
+ * lowest first; all but its last byte are above 127.
+ *
+ *   version; world | learner << 4; rules
+ *   seed, ants, 1000 epsilon, 1000 learning rate, 1000 discount, learns, first value *, level,
+ *   1 + regrowth, shaping *
+ *   events: ticks since the event before; then
+ *     kind | reach << 3 for a stroke, its first cell, and bytes kind | n << 3:
+ *       0 .. 5: n + 1 steps along this heading; 6: a wait of n + 1 ticks; 7: the end
+ *     4 | setting << 3 for a setting, and its value
+ *
+ * Numbers marked * can be negative: n is written as 2 n, or -2 n - 1. Each part of a stroke between
+ * waits is an event, which paints all cells within `reach` of its own cells.
+ */
 import { LIMITS, SIGNED, STEPS, THOUSANDTHS, hexDistance, leastOf } from "./engine.js";
 import { WORLDS } from "./worlds.js";
 
