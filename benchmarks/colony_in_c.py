@@ -1,9 +1,9 @@
 """Compare the speed of a colony with a program in C that does the same.
 
 Ants are spread over open worlds, with eight cells per ant, and learn into one table by Q-learning,
-under the rules of `paper()`, `foraging()` and `queueing()`. The program colony.c does the same with as many
-threads, and its results are bit-for-bit equal. CC sets its compiler. Otherwise it is clang, which
-makes it faster than gcc does, or gcc if threads need OpenMP and clang has none. The command
+under the rules of `paper()`, `foraging()` and `queueing()`. The program colony.c does the same with
+as many threads, and its results are bit-for-bit equal. CC sets its compiler. Otherwise it is clang,
+which makes it faster than gcc does, or gcc if threads need OpenMP and clang has none. The command
 measures both in turn, several times. The table contains medians, and ratios above 1 where Taichi
 Ants is faster. On a busy machine, use `--threads 1`, which is measured by processor time; several
 threads in C wait long for each other.

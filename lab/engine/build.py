@@ -1,6 +1,7 @@
 """Build colony.wasm and ant.wasm from C, with clang and lld: python lab/engine/build.py
 
-It also writes the tables of lab/page/worlds.js from the package: worlds and the hand-written policy.
+It also writes the tables of lab/page/worlds.js from the package: the worlds, and the best actions
+of the hand-written policy.
 
 The files are committed, with their checksums and the compiler in built.json, so that a page needs
 no compiler. Other compilers make other bytes with the same results, which tests compare.
@@ -44,17 +45,9 @@ def build(folder: Path = ENGINE, clang: str = "clang") -> dict[str, str]:
 def with_tables(script: str) -> str:
     """Return worlds.js with the present tables of the package."""
     begin, end = script.index("/* GENERATED */\n"), script.index("/* END */\n")
-    numbers = {
-        "home": lab.HOME,
-        "trail": lab.TRAIL,
-        "pile": lab.PILE,
-        "fromHome": lab.FROM_HOME,
-        "fromEdge": lab.FROM_EDGE,
-    }
-    lines = [f"const LAB = {json.dumps(numbers)};", "export const WORLDS = ["]
-    lines += [f"  {json.dumps(world._asdict())}," for world in lab.WORLDS]
+    lines = [f"const LAB = {Path(lab.__file__).with_suffix('.json').read_text('utf-8').strip()};"]
     # A letter for each state: its best actions are the bits of its place after "@".
-    lines += ["];", "export const FOLLOWERS = {"]
+    lines.append("export const FOLLOWERS = {")
     for observation in ("paper", "ants", "queues"):
         rows = trail_follower(observation)
         letters = "".join(chr(64 + sum(1 << int(a) for a in row.nonzero()[0])) for row in rows)

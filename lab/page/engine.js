@@ -4,16 +4,18 @@
  *   const module = await WebAssembly.compile(bytes)       // once
  *   const engine = new Engine(module, scene, events?)     // starts; takes 3 ms
  *   scene: see SCENE in worlds.js; new Engine(module, { ...SCENE, rules: RULES.foraging, seed: 7 })
- *   engine.scene has the present settings; engine.world, .radius, .size, .queen the world
+ *   engine.scene has the present settings, engine.first those of the start; engine.world, .radius, .size, .queen the world
  *   events: what to replay, as `decode` of link.js returns it; see `apply`
  *
  *   engine.pass(ticks)    events of a replay are applied on the way, each at its tick
  *   engine.apply(event)   a change between two ticks, which is recorded in `engine.events`:
  *     { do: "rock" | "food" | "scent" | "erase", reach: 0..7, path: [cells] }
  *       a stroke: all cells within `reach` of a path of adjacent cells. While a visitor draws, apply
- *       the new cells of each frame as an event of its own, without the last cell of the one before.
+ *       the new cells of each frame as an event of its own, without the last cell of the one before
+ *       (a link then writes them as one stroke). Cells outside the world are dropped.
  *     { do: "ants" | "epsilon" | "rate" | "discount" | "level" | "shaping" | "learns", value }
- *       `level` is how long new scent lasts, in ticks; `learns` is 0 or 1
+ *       `level` is how long new scent lasts, in ticks; `learns` is 0 or 1. Values are rounded to
+ *       what links can have (see LIMITS); `engine.scene` has the result.
  *   engine.forget()       drops the rest of a replay, when the visitor acts
  *   engine.tick, .ants, .deliveries, .returns, .moves, .blocked
  *   engine.changed        true after ground has changed by `apply`; the page sets it to false
@@ -62,11 +64,23 @@ export const LEARNERS = { q_learning: 0, sarsa: 1, frozen: 2 };
 export const CAPACITY = 10000;
 /** Steps (q, r) to the neighbours of a cell by heading, clockwise; heading 0 points up. */
 export const STEPS = [[1, 0], [1, 1], [0, 1], [-1, 0], [-1, -1], [0, -1]];
-const STROKES = ["rock", "food", "scent", "erase"];
 const START_LEVEL = 25;
 
 /** The distance of two cells that are (q, r) apart. */
 export const hexDistance = (q, r) => Math.max(q, r, 0) - Math.min(q, r, 0);
+/** The largest values of settings, as links have them: some in thousandths. */
+export const LIMITS = {
+  seed: Number.MAX_SAFE_INTEGER, ants: CAPACITY, epsilon: 1000, rate: 1000, discount: 1000,
+  learns: 1, first: 1000, level: 100000, regrowth: 1000000, shaping: 100,
+};
+export const THOUSANDTHS = ["epsilon", "rate", "discount"], SIGNED = ["first", "shaping"];
+export const leastOf = (name) => ({ ants: 1, level: 1, regrowth: -1 })[name] ?? (SIGNED.includes(name) ? -LIMITS[name] : 0);
+
+/** The nearest value of a setting that a link can have. */
+export function allowed(name, value) {
+  const unit = THOUSANDTHS.includes(name) ? 1000 : 1;
+  return Math.max(leastOf(name), Math.min(LIMITS[name], Math.round(value * unit))) / unit;
+}
 const bits = (mask) => ACTIONS.map((_, a) => a).filter((a) => mask >> a & 1);
 
 export class Engine {
@@ -93,10 +107,12 @@ export class Engine {
     this.look();
     for (const [cells, what] of [[this.world.rocks, ROCK], [this.world.foods, FOOD], [[this.queen], QUEEN]])
       for (const cell of /** @type {number[]} */ (cells)) this.laid[cell] = /** @type {number} */ (what);
-    this.scene.ants = Math.min(scene.ants, wasm.room());
+    for (const name of Object.keys(LIMITS)) this.scene[name] = allowed(name, scene[name]);
+    this.scene.ants = Math.min(this.scene.ants, wasm.room());
+    this.first = { ...this.scene }; // for links
     this.setNumbers();
     this.setRate();
-    wasm.begin(scene.seed >>> 0, Math.floor(scene.seed / 2 ** 32), this.scene.ants, scene.first);
+    wasm.begin(this.first.seed >>> 0, Math.floor(this.first.seed / 2 ** 32), this.first.ants, this.first.first);
     if (scene.learner === LEARNERS.frozen) this.follow();
     this.brush.set(this.world.scent);
     if (this.world.scent.length) wasm.lay_scent(this.world.scent.length, START_LEVEL);
@@ -167,24 +183,40 @@ export class Engine {
    * @param {Change} change
    */
   apply(change) {
-    const event = { ...change, tick: this.tick };
-    if ("path" in event) this.paint(event);
-    else {
-      if (event.do === "ants") this.wasm.set_ants(event.value = Math.max(1, Math.min(event.value, this.wasm.room())));
-      this.scene[event.do] = event.value;
-      if (event.do === "rate" || event.do === "learns") this.setRate();
-      else if (event.do !== "ants") this.setNumbers();
+    if ("path" in change) {
+      for (const path of this.rows(change.path)) {
+        this.paint({ ...change, path });
+        this.events.push({ ...change, path, tick: this.tick });
+      }
+      return;
     }
-    this.events.push(event);
-    return event;
+    const name = change.do, value = name === "ants" ? Math.min(change.value, this.wasm.room()) : change.value;
+    this.scene[name] = allowed(name, value);
+    if (name === "ants") this.wasm.set_ants(this.scene.ants);
+    else if (name === "rate" || name === "learns") this.setRate();
+    else this.setNumbers();
+    this.events.push({ do: name, value: this.scene[name], tick: this.tick });
+  }
+
+  /** The parts of a path that are rows of adjacent cells of the world, as links need them. */
+  rows(path) {
+    const rows = /** @type {number[][]} */ ([]);
+    let last = -1;
+    for (const cell of path) {
+      const inside = this.exists(this.q(cell), this.r(cell));
+      const near = STEPS.some(([q, r]) => last + q + r * this.width === cell);
+      if (inside && last >= 0 && near) rows[rows.length - 1].push(cell);
+      else if (inside && cell !== last) rows.push([cell]);
+      last = inside ? cell : -1;
+    }
+    return rows;
   }
 
   /** @param {Stroke} stroke */
   paint(stroke) {
     const cells = [...new Set(stroke.path.flatMap((cell) => this.disc(cell, stroke.reach)))];
-    const what = [ROCK, FOOD, 0, EMPTY][STROKES.indexOf(stroke.do)];
     this.brush.set(cells);
-    if (stroke.do !== "scent") this.wasm.put(cells.length, what);
+    if (stroke.do !== "scent") this.wasm.put(cells.length, { rock: ROCK, food: FOOD, erase: EMPTY }[stroke.do]);
     if (stroke.do === "scent" || stroke.do === "erase")
       this.wasm.lay_scent(cells.length, stroke.do === "scent" ? Math.floor((this.scene.level + 1) / 2) : 0);
     this.changed = true;

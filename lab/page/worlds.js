@@ -25,15 +25,28 @@ export const SCENE = {
 
 // The next lines are written by `python lab/engine/build.py`, from taichi_ants.
 /* GENERATED */
-const LAB = {"home": 14, "trail": 25, "pile": 12, "fromHome": 8, "fromEdge": 4};
-export const WORLDS = [
-  {"name": "meadow", "radius": 32, "queen": [-15, -18], "shapes": [[5, 6, -12, 9], [5, 9, -9, 13], [5, 11, -5, 6], [5, 23, 4, 9], [5, 23, 7, 6], [5, 12, -1, 5], [5, -9, 3, 13], [5, -10, 6, 9], [5, -14, -1, 6], [5, 2, 19, 12], [5, 1, 21, 8], [5, -28, -16, 9], [5, -28, -13, 5], [5, -20, 8, 9], [5, -17, 11, 4], [5, -4, -25, 7], [5, -7, -25, 3], [5, 27, 15, 6], [5, 26, 17, 3], [5, 16, 28, 4], [7, 17, 19, 13]], "walled": false, "rocks": 0, "largest": 0, "piles": 0, "nearest": 0, "daily": false},
-  {"name": "plain", "radius": 64, "queen": [0, 0], "shapes": [], "walled": false, "rocks": 90, "largest": 24, "piles": 9, "nearest": 14, "daily": false},
-  {"name": "steppe", "radius": 130, "queen": [0, 0], "shapes": [], "walled": false, "rocks": 260, "largest": 40, "piles": 24, "nearest": 14, "daily": false},
-  {"name": "bridge", "radius": 24, "queen": [-17, 0], "shapes": [[0, -17, 0, 27], [0, -12, 0, 1, 0, 2], [0, 10, 0, 1, 0, 2], [0, 17, 0, 27], [0, -10, 0, 1, 1, 3], [0, -7, 3, 1, 0, 17], [0, 10, 3, 1, 5, 3], [0, -10, 0, 1, 5, 9], [0, -10, -9, 1, 0, 11], [0, 1, -9, 1, 1, 9], [7, 17, 0, 9]], "walled": true, "rocks": 0, "largest": 0, "piles": 0, "nearest": 0, "daily": false},
-  {"name": "paper", "radius": 10, "queen": [-9, 0], "shapes": [[2, -8, 0, 0, 0, 16], [7, 9, 0, 0]], "walled": false, "rocks": 0, "largest": 0, "piles": 0, "nearest": 0, "daily": false},
-  {"name": "daily", "radius": 30, "queen": [-13, -15], "shapes": [], "walled": false, "rocks": 40, "largest": 16, "piles": 2, "nearest": 28, "daily": true},
-];
+const LAB = {
+  "home": 14, "trail": 25, "pile": 12, "fromHome": 8, "fromEdge": 4,
+  "worlds": [
+    {"name": "meadow", "radius": 32, "queen": [-15, -18], "shapes": [
+      [5, 6, -12, 9], [5, 9, -9, 13], [5, 11, -5, 6], [5, 23, 4, 9], [5, 23, 7, 6], [5, 12, -1, 5],
+      [5, -9, 3, 13], [5, -10, 6, 9], [5, -14, -1, 6], [5, 2, 19, 12], [5, 1, 21, 8],
+      [5, -28, -16, 9], [5, -28, -13, 5], [5, -20, 8, 9], [5, -17, 11, 4], [5, -4, -25, 7],
+      [5, -7, -25, 3], [5, 27, 15, 6], [5, 26, 17, 3], [5, 16, 28, 4], [7, 17, 19, 13]
+    ]},
+    {"name": "plain", "radius": 64, "queen": [0, 0], "rocks": 90, "largest": 24, "piles": 9, "nearest": 14, "shapes": []},
+    {"name": "steppe", "radius": 130, "queen": [0, 0], "rocks": 260, "largest": 40, "piles": 24, "nearest": 14, "shapes": []},
+    {"name": "bridge", "radius": 24, "queen": [-17, 0], "walled": true, "shapes": [
+      [0, -17, 0, 27], [0, -12, 0, 1, 0, 2], [0, 10, 0, 1, 0, 2], [0, 17, 0, 27],
+      [0, -10, 0, 1, 1, 3], [0, -7, 3, 1, 0, 17], [0, 10, 3, 1, 5, 3], [0, -10, 0, 1, 5, 9],
+      [0, -10, -9, 1, 0, 11], [0, 1, -9, 1, 1, 9], [7, 17, 0, 9]
+    ]},
+    {"name": "paper", "radius": 10, "queen": [-9, 0], "shapes": [
+      [2, -8, 0, 0, 0, 16], [7, 9, 0, 0]
+    ]},
+    {"name": "daily", "radius": 30, "queen": [-13, -15], "rocks": 40, "largest": 16, "piles": 2, "nearest": 28, "daily": true, "shapes": []}
+  ]
+};
 export const FOLLOWERS = {
   128: "BCDHEADHBBBHHHHHFBDHDADHBBBHHHHHAAEHAAEHBBBHHHHHHHHHHHHHHHHHHHHHGCDPEADPBBFPPPPPFBDPDADPBBFPPPPPAAEPAAEPCCGPPPPPPPPPPPPPPPPPPPPP",
   432: "BCDHPCEADHPABBBHPBHHHHHHPPPHPPEADHPAFBDHPBDADHPABBBHPBHHHHHHPPPHPPDADHPAAAEHPAAAEHPABBBHPBHHHHHHPPPHPPAAEHPAHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHPPPHPPPPPHPPPPPHPPHHHHHHPPPHPPPPPHPPFBDHPBDADHPABBBHPBHHHHHHPPPHPPDADHPAGCDPDGEADPDEBBBPBBPPPPPPBBBPBBGCDPDGFBDPDFDADPDDBBBPBBPPPPPPBBBPBBFBDPDFAAEPEAAAEPEABBBPBBPPPPPPBBBPBBAAEPEAPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPAAEPEAAAEPEABBBPBBPPPPPPBBBPBBAAEPEAGCDPDGEADPDEBBBPBBPPPPPPBBBPBBGCDPDG",
@@ -41,6 +54,7 @@ export const FOLLOWERS = {
 };
 /* END */
 
+export const WORLDS = /** @type {any[]} */ (LAB.worlds);
 const PAINTS_EMPTY = 0, PAINTS_SCENT = 2, PAINTS_ROCK = 5, PAINTS_FOOD = 7;
 const STEP_Q = [1, 1, 0, -1, -1, 0], STEP_R = [0, 1, 1, 0, -1, -1];
 const lengthOf = (q, r) => Math.max(q, r, 0) - Math.min(q, r, 0);
@@ -64,24 +78,8 @@ function drawnShapes({ radius, queen, rocks, largest, piles, nearest, daily }, s
   };
   const shapes = [];
   for (let k = 0; k < rocks; k++) shapes.push([PAINTS_ROCK, ...place(LAB.fromHome), draw(largest)]);
-  for (let k = 0; k < piles; k++) {
-    const pile = place(nearest);
-    if (k === 0) shapes.push(...shapesOfPath(queen, pile));
-    shapes.push([PAINTS_FOOD, ...pile, LAB.pile]);
-  }
+  for (let k = 0; k < piles; k++) shapes.push([PAINTS_FOOD, ...place(nearest), LAB.pile]);
   return shapes;
-}
-
-/** A shortest path, at most three straight rows of empty cells. */
-function shapesOfPath([q, r], end) {
-  const dq = end[0] - q, dr = end[1] - r;
-  const both = Math.max(Math.min(dq, dr), 0) + Math.min(Math.max(dq, dr), 0);
-  return [[1, both], [0, dq - both], [2, dr - both]].map(([heading, n]) => {
-    const row = [PAINTS_EMPTY, q, r, 0, n >= 0 ? heading : heading + 3, Math.abs(n)];
-    q += n * STEP_Q[heading];
-    r += n * STEP_R[heading];
-    return row;
-  });
 }
 
 /**
