@@ -6,6 +6,7 @@ import { QUESTIONS } from "./scenes.js";
 import { many } from "./story.js";
 
 const SAVE_MS = 250;
+const DAMAGED = "This link is damaged. The lab starts anew.";
 const MOST_REPLAY = 200_000; // ticks of a link that are replayed at once
 
 /** The text after "#" that replays the runs up to now; two runs are joined by "~". */
@@ -80,7 +81,7 @@ export class Address {
       });
     } catch (error) {
       lab.begin();
-      lab.toast(error.message, 6000);
+      lab.toast(error instanceof URIError ? DAMAGED : error.message, 6000);
       return true;
     }
     lab.begin(starts);

@@ -46,6 +46,9 @@ class Lab {
     this.plot = new Plot(byId("plot"));
     this.frames = []; // [ms at which a frame began, ms of drawing]
     [this.owed, this.last, this.told, this.wordsAt, this.minds] = [0, 0, "", 0, 0];
+    byId("questions").innerHTML = "<h2>What do you expect?</h2>"
+      + QUESTIONS.map(({ id, title }) => `<button data-question="${id}">${title}</button>`).join("")
+      + '<button data-question="daily">Today’s map: ten rocks</button><button id="train">One ant, alone: learning curves</button>';
     this.begin();
     this.controls = new Controls(this);
     this.address = new Address(this);
@@ -54,9 +57,6 @@ class Lab {
     this.training = new Training(this, bytesOf(ANT_WASM));
     this.brushes = this.sides.map((side) => new Brush(this, side));
     new ResizeObserver(() => { this.fits = false; }).observe(byId("views"));
-    byId("questions").innerHTML = "<h2>What do you expect?</h2>"
-      + QUESTIONS.map(({ id, title }) => `<button data-question="${id}">${title}</button>`).join("")
-      + '<button data-question="daily">Today’s map: ten rocks</button><button id="train">One ant, alone: learning curves</button>';
     byId("questions").addEventListener("click", ({ target }) => {
       if (target.dataset.question) this.address.open(target.dataset.question);
       if (target.dataset.question) scrollTo({ top: 0, behavior: this.ui.still ? "auto" : "smooth" });

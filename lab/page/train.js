@@ -183,13 +183,13 @@ export class Training {
       x.stroke();
       x.setLineDash([]);
       x.textAlign = "right";
-      x.fillText(`${nameOf(setting)}, rate ${setting.rate}, discount ${setting.discount}`, w - 6, Math.min(h - 26, py(points[points.length - 1].mean) - 8));
+      x.fillText(CHOICES.map(([name]) => wordingOf(name, setting)).join(" · "), w - 6, h - 30 - 17 * (this.curves.length - 1 - k));
     });
   }
 
   drawGrid(rows) {
     const { x, w, h, colours } = this.surface(), names = [...new Set(GRID.map(nameOf))], space = (h - 22) / names.length;
-    const low = Math.min(0, ...rows.map((row) => row.iqm)), high = Math.max(10, ...rows.map((row) => row.iqm));
+    const all = rows.map((row) => row.iqm), low = Math.floor(Math.min(...all) - 1), high = Math.ceil(Math.max(...all) + 1);
     const px = (v) => 10 + (v - low) / (high - low) * (w - 20);
     names.forEach((name, k) => {
       [x.fillStyle, x.textAlign] = [colours.text, "left"];
