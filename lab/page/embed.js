@@ -72,6 +72,7 @@ export class Embed {
   }
 
   facts() {
+    this.lab.words(); // the story of now
     const { runs, ui, told } = this.lab;
     return {
       lab: "facts", playing: ui.playing, story: told, link: visitOf(runs),
