@@ -17,6 +17,7 @@ from taichi_ants import interventions as changes
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, expect
+from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference.random_stream import hash_of
@@ -85,6 +86,12 @@ def replay(link: str) -> Replayed:
             "the link is damaged, or is not one of the lab; copy it there again, with its tick and "
             "hash."
         ) from error
+    colony = played(scene, events, tick)
+    return Replayed(tick, int(colony.deliveries[0]), state_hash(colony), expected)
+
+
+def played(scene: dict[str, Any], events: list[Event], tick: int) -> Colony:
+    """Return the colony of a scene at a tick, after these events."""
     ants = [scene["ants"], *(int(event.value) for event in events if event.does == "ants")]
     colony = _begun(scene, max(ants))
     to = Interventions(colony, lasting=False)
@@ -93,7 +100,7 @@ def replay(link: str) -> Replayed:
             colony.tick(event.tick - colony.ticks)
         for change in _changes(event, scene, colony):
             to.apply(change)
-    return Replayed(tick, int(colony.deliveries[0]), state_hash(colony), expected)
+    return colony
 
 
 def decoded(code: str) -> tuple[dict[str, Any], list[Event]]:
@@ -204,12 +211,12 @@ def _changes(event: Event, scene: dict[str, Any], colony: Colony) -> Iterator[ch
         scene[event.does] = event.value
     match event.does:
         case "rock" | "food":
-            yield changes.Place(event.does, _cells(event, colony))
+            yield changes.Place(event.does, cells_within(event, colony.grid))
         case "scent":
-            yield changes.SetTrail((scene["level"] + 1) // 2, _cells(event, colony))
+            yield changes.SetTrail((scene["level"] + 1) // 2, cells_within(event, colony.grid))
         case "erase":
-            yield changes.Clear(_cells(event, colony))
-            yield changes.SetTrail(0, _cells(event, colony))
+            yield changes.Clear(cells_within(event, colony.grid))
+            yield changes.SetTrail(0, cells_within(event, colony.grid))
         case "ants":
             yield changes.SetAnts(int(event.value))
         case "epsilon":
@@ -222,9 +229,9 @@ def _changes(event: Event, scene: dict[str, Any], colony: Colony) -> Iterator[ch
             yield changes.SetLearningRate(scene["rate"] * scene["learns"])
 
 
-def _cells(event: Event, colony: Colony) -> list[int]:
+def cells_within(event: Event, grid: AxialGrid) -> list[int]:
     """Return the flat indices of the cells within reach of the path of a stroke."""
-    grid, around = colony.grid, range(-event.reach, event.reach + 1)
+    around = range(-event.reach, event.reach + 1)
     radius = grid.ranges[0]
     disc = [(a, b) for a in around for b in around if distance(a, b) <= event.reach]
     near = {(q + a, r + b) for q, r in event.path for a, b in disc}

@@ -30,7 +30,8 @@
  *
  *   engine.mind(ant)      what an ant sees and will do: { carries, codes: [left, forward, right],
  *                         levels: [...], state, values: [5], best: [actions], next, why }
- *                         `codes` index LETTERS; `why` is "best", "tie" or "explores"
+ *                         `codes` index LETTERS; `why` is "best", "tie" (of several best actions),
+ *                         "explores", or "was best" (SARSA draws an action before it learns)
  *   engine.policy(cell, heading, carries)   { state, values, best } of an ant that would stand there
  *
  * CELLS are numbers: engine.at(q, r), engine.q(cell), engine.r(cell), engine.exists(q, r),
@@ -231,8 +232,8 @@ export class Engine {
   mind(ant) {
     this.wasm.read_mind(ant);
     const carries = this.looks[ant] & 1, seen = this.seen(carries);
-    const why = this.read[10] ? "explores" : seen.best.length > 1 ? "tie" : "best";
-    return { ...seen, carries, next: this.read[9], why };
+    const next = this.read[9], only = seen.best.length > 1 ? "tie" : "best";
+    return { ...seen, carries, next, why: this.read[10] ? "explores" : seen.best.includes(next) ? only : "was best" };
   }
 
   /** What an ant with this place and load would see, and its best actions. */
