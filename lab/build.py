@@ -18,8 +18,8 @@ BUILT = LAB.parent / "docs" / "lab.html"
 MOST_BYTES = 400_000
 # In this order: each module uses only those before it while it is loaded.
 MODULES = (
-    *("worlds", "engine", "link", "geometry", "looks", "run", "story", "shapes", "draw", "plot", "mind", "scenes"),
-    *("daily", "brush", "controls", "train", "address", "film", "embed", "main"),
+    *("worlds", "engine", "link", "geometry", "looks", "run", "story", "shapes", "draw", "plot"),
+    *("mind", "scenes", "daily", "brush", "controls", "train", "address", "film", "embed", "main"),
 )
 FONTS = (("Newsreader", "500", "newsreader.woff2"), ("Inter", "400 650", "inter.woff2"))
 BINARIES = {"COLONY": "colony.wasm", "ANT": "ant.wasm"}
@@ -51,7 +51,8 @@ def page() -> str:
         for name, weight, file in FONTS
     )
     binaries = "".join(
-        f'const {name}_WASM = "{base64_of(LAB / "engine" / file)}";\n' for name, file in BINARIES.items()
+        f'const {name}_WASM = "{base64_of(LAB / "engine" / file)}";\n'
+        for name, file in BINARIES.items()
     )
     parts = {
         "STYLE": faces + (PAGE / "style.css").read_text("utf-8"),
@@ -60,8 +61,8 @@ def page() -> str:
     whole = (PAGE / "page.html").read_text("utf-8")
     for name, text in parts.items():
         whole = whole.replace(f"/* {name} */", text)
-    if len(whole.encode()) > MOST_BYTES:
-        raise ValueError(f"the page has {len(whole.encode())} bytes, at most {MOST_BYTES} are allowed")
+    if (size := len(whole.encode())) > MOST_BYTES:
+        raise ValueError(f"the page has {size} bytes, at most {MOST_BYTES} are allowed")
     return whole
 
 
