@@ -139,9 +139,9 @@ def drawn(rng: np.random.Generator, name: str, length: int = 0) -> Any:
     if name == "reward":
         return float(rng.integers(-MOST_REWARD, MOST_REWARD + 1))
     if name == "values":
-        return float(np.float32(rng.choice([0.0, 1.0, rng.normal(scale=30)])))
+        return float(np.float32((0.0, 1.0, rng.normal(scale=30))[rng.integers(3)]))
     # Usual levels are often drawn, and the largest ones sometimes.
-    level = rng.choice([0.0, 250.0, 10 ** rng.uniform(0, 9 if rng.random() < 0.25 else 6)])
+    level = (0.0, 250.0, 10 ** rng.uniform(0, 9 if rng.random() < 0.25 else 6))[rng.integers(3)]
     return float(np.float32(level) if rng.random() < 0.5 else int(level))
 
 

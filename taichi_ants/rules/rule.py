@@ -178,7 +178,7 @@ def drawn_parameters(rule: Rule, rng: np.random.Generator) -> dict[str, Any]:
     for setting in declared(rule.settings):
         least, most = setting.rule.least, setting.rule.most
         if least is not None and most is not None and rng.random() < 0.5:
-            value = float(rng.choice([least, most, rng.uniform(least, most)]))
+            value = float((least, most, rng.uniform(least, most))[rng.integers(3)])
             values[setting.name] = round(value) if setting.kind is int else value
     return values
 
