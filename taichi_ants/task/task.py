@@ -150,7 +150,7 @@ class Task(Settings, path="task"):
         Setting(choices=partial(words, "reward")),
     ] = "by_event"
     rules: Annotated[
-        Named[Parameters], Setting("parameters of the rules that you wrote, by name")
+        Named[Parameters], Setting("parameters of rules that are functions, by name")
     ] = field(default_factory=Named)
 
     def check(self) -> None:
