@@ -9,11 +9,12 @@ from taichi.lang.impl import subscript
 from taichi_ants.engines.colony import columns
 from taichi_ants.engines.colony.layout import COLUMNS, NestRow, WorldRow
 from taichi_ants.features import numbers_of_castes
+from taichi_ants.features.cues import CUES
 from taichi_ants.features.feature import ANT, CASTE, NEST
 from taichi_ants.kernel_functions import Named, while_compiling
 from taichi_ants.task.model import Model
 
-WORLD = "world"
+WORLD, MAP = "world", "map"
 
 
 def entries_of(model: Model) -> dict[str, tuple[str, str, int | None]]:
@@ -29,6 +30,7 @@ def entries_of(model: Model) -> dict[str, tuple[str, str, int | None]]:
         **{row.name.lower(): ("nests", NEST, row) for row in NestRow},
         **{name: ("castes", CASTE, row) for row, name in enumerate(of_castes)},
         **{array.name: (array.name, array.per, None) for array in arrays},
+        **{name: (name, MAP, None) for cue in CUES.values() for name in cue.arrays},
     }
 
 
@@ -45,6 +47,8 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
             return w
         if per == ANT:
             return ant
+        if per == MAP:
+            return columns.own_map(c, v, w, ant)
         if per == CASTE:
             return columns.trait(c.caste, ant)
         number = columns.nest_of(c, v, ant) if nest is None else nest
