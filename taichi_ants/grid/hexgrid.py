@@ -159,6 +159,16 @@ class AxialGrid:
         high -= np.minimum(np.minimum(q, r), np.int32(0))
         return high.reshape(-1)
 
+    def falling(self, values: np.ndarray) -> np.ndarray:
+        """Return bit h by cell, 1 if the neighbour at heading h has a smaller value: uint8 (size,).
+
+        `values` (size,) has those of void cells, too; the bits of void cells are 0.
+        """
+        bits = np.zeros(self.size, np.uint8)
+        for heading, offset in enumerate(self.offsets.tolist()):
+            bits |= (np.roll(values, -offset) < values).astype(np.uint8) << np.uint8(heading)
+        return bits * self.exists
+
     def number(self, cells: object) -> np.ndarray:
         """Return the ranks, int64 (...), of cells (..., 3) in the lexicographic order of cells."""
         normal = normal_form(cells)
