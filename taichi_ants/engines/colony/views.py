@@ -39,7 +39,8 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
 
     An attribute is an entry of an array, which can be assigned: by the slot of the ant, or by its
     nest, world or caste. `task` has the settings that features declare as numbers, for example
-    `task.labour.demand`. Other names are those of the arrays and numbers of kernels.
+    `task.labour.demand`, and `place` is the index of the ant's cell in arrays by cell. Other names
+    are those of the arrays and numbers of kernels.
     """
 
     def index(per: str) -> Any:
@@ -62,6 +63,8 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
     def read(name: str) -> Any:
         if name == "task":
             return Named(group)
+        if name == "place":
+            return w * c.size + subscript(None, c.cell, ant)
         if name not in v.entries:
             return getattr(c, name)
         array, per, row = v.entries[name]
