@@ -24,21 +24,25 @@ class Cue(NamedTuple):
             neighbour there is better than the ant's own cell.
         arrays: Functions by the names of the arrays that `better` reads at the ant's cell: of a
             world and a nest, they return uint8 (grid.size,).
+        sees_loads: Whether `better` reads from `ground` which ants have food.
     """
 
     words: str
     better: KernelFunction
     arrays: Mapping[str, Callable[[World, int], Any]]
+    sees_loads: bool
 
 
 CUES: dict[str, Cue] = {}  # by the name in tasks
 
 
-def cue(words: str, **arrays: Callable[[World, int], Any]) -> Callable[[Function], KernelFunction]:
+def cue(
+    words: str, sees_loads: bool = False, **arrays: Callable[[World, int], Any]
+) -> Callable[[Function], KernelFunction]:
     """Register a function as the `better` of a cue by its name, as a decorator."""
 
     def register(body: Function) -> KernelFunction:
-        CUES[body.__name__] = Cue(words, KernelFunction(body), arrays)
+        CUES[body.__name__] = Cue(words, KernelFunction(body), arrays, sees_loads)
         return CUES[body.__name__].better
 
     return register

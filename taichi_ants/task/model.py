@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from taichi_ants.features import used_by
+from taichi_ants.features.cues import CUES
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.field import TRAIL
 from taichi_ants.task.task import Task
@@ -99,7 +100,8 @@ class Model:
         self.sees_paper_state = self.is_papers and not self.misreads
         # Whether the cell of an ant must show that the ant carries food.
         under_carriers = any(self.views[cue] == "strongest_under_carriers" for cue in followed)
-        self.sees_ants = not self.is_papers or under_carriers
+        sees_loads = any(CUES[sense].sees_loads for sense in self.senses)
+        self.sees_ants = not self.is_papers or under_carriers or sees_loads
 
         # Your own rules, in the order of their parameters, and where they are used.
         self.rules, self.choice = task.own_rules, task.choice.rule
