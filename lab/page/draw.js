@@ -8,7 +8,7 @@ import { outline } from "./shapes.js";
 
 const DIRECTIONS = 32;          // of the pictures of ants
 const MOST_PIXELS = 2;          // per CSS pixel
-const DOTS = { ants: 4000, scale: 1.9 }; // more ants, or smaller cells: ants are dots
+const DOTS = { ants: 4000, scale: 1.7 }; // more ants, or smaller cells: ants are dots
 const TAU = 2 * Math.PI;
 
 export class Painter {

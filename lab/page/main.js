@@ -87,7 +87,7 @@ class Lab {
     });
     byId("views").classList.toggle("two", starts.length > 1);
     byId("other").hidden = starts.length < 2;
-    byId("unit").innerHTML = starts.length < 2 ? "food per <br>minute" : "right, food <br>per minute";
+    byId("unit").innerHTML = starts.length < 2 ? "food per <br>minute" : "right, per <br>minute";
     Object.assign(this.ui, { followed: -1, hero: -1, ghost: null });
     byId("undo").disabled = true;
     this.plot.reset();
