@@ -46,8 +46,7 @@ from taichi_ants.learners.learner import Memory
 from taichi_ants.learners.policies import check_finite, checked_values, frozen_policy
 from taichi_ants.records import Snapshot, same
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW, Event
 from taichi_ants.task.field import TRAIL
 from taichi_ants.task.model import Model
 from taichi_ants.worlds.world import Start, World
