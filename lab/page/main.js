@@ -16,7 +16,8 @@ import { many, storyOf } from "./story.js";
 import { Training } from "./train.js";
 import { SCENE } from "./worlds.js";
 
-/* global COLONY_WASM, ANT_WASM */
+// @ts-ignore: build.py declares it before all modules
+const { COLONY_WASM, ANT_WASM } = BINARIES;
 const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 const MOST_TICKS_MS = 22; // of a frame; ticks that do not fit are dropped
 const WORDS_MS = 100;     // between two changes of words
@@ -39,13 +40,19 @@ class Lab {
     this.ui = { playing: true, speed: 1, brush: "rock", reach: 1, theme: "dark", pointer: null, down: false, focused: false,
                 followed: -1, hero: -1, ghost: null, arrows: "", still: calm.matches, now: 0 };
     calm.addEventListener("change", () => { this.ui.still = calm.matches; });
-    this.sides = [...document.querySelectorAll(".view")].map((view) => {
+    const views = /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".view"));
+    this.sides = [...views].map((view) => {
       const canvas = view.querySelector("canvas");
       return { view, canvas, caption: view.querySelector("figcaption"), painter: new Painter(canvas), run: null };
     });
     this.plot = new Plot(byId("plot"));
     this.frames = []; // [ms at which a frame began, ms of drawing]
-    [this.owed, this.last, this.told, this.wordsAt, this.minds] = [0, 0, "", 0, 0];
+    this.owed = 0;    // ticks that are due
+    this.last = 0;    // ms of the last frame, of the last words, and of the first frame
+    this.wordsAt = 0;
+    this.firstFrame = 0;
+    this.told = "";   // what the story told last
+    this.minds = 0;
     byId("questions").innerHTML = "<h2>What do you expect?</h2>"
       + QUESTIONS.map(({ id, title }) => `<button data-question="${id}">${title}</button>`).join("")
       + '<button data-question="daily">Today’s map: ten rocks</button><button id="train">One ant, alone: learning curves</button>';
@@ -254,6 +261,7 @@ class Lab {
 
   words() {
     const { ui } = this, runs = this.runs, run = runs[runs.length - 1];
+    /** @type {import("./story.js").Story} */
     const told = this.question ? questionStory(this.question, runs) : Daily.is(run) ? this.daily.story(run) : storyOf(run);
     if (told.id !== this.told) {
       this.told = told.id;
@@ -273,6 +281,7 @@ class Lab {
     if (!byId("mind").hidden && this.minds++ % 3 === 0) byId("table").innerHTML = mindOf(run, ui);
   }
 
+  /** Show a new headline. @param {import("./story.js").Story} told */
   restartAnimation({ head, options, ghost }) {
     const story = byId("headline").closest(".story");
     story.classList.remove("new");

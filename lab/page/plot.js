@@ -9,7 +9,8 @@ export class Plot {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
-    this.reset();
+    this.marks = []; // ticks with a word
+    this.most = 120; // of the axis, loads per minute
   }
 
   reset() { [this.marks, this.most] = [[], 120]; }

@@ -16,7 +16,7 @@ const MOST_SPARKS = 80;
 const PICKED_UP = EVENTS.pickedUp, DELIVERED = EVENTS.delivered;
 
 export class Run {
-  /** @param {object} scene see SCENE in worlds.js  @param {object[]} events a replay, see engine.js */
+  /** @param {WebAssembly.Module} module  @param {import("./worlds.js").Scene} scene  @param {any[]} events a replay, see engine.js */
   constructor(module, scene, events = []) {
     const e = this.engine = new Engine(module, scene, events);
     this.scene = e.scene;
@@ -28,7 +28,8 @@ export class Run {
     this.visits = new Int32Array(e.values.length / 8); // how often an ant was in a state
     this.sparks = [];                                  // pick-ups and deliveries, which the drawing shows for a moment
     this.seen = 0;                                     // events that are noted
-    [this.start, this.earned] = [0, 0];                // the tick at which somebody began to watch, and the returns then
+    this.start = 0;                                    // the tick at which somebody began to watch
+    this.earned = 0;                                   // the returns then
   }
 
   get tick() { return this.engine.tick; }
