@@ -80,7 +80,9 @@ class Model:
         self.begins = self.independent and learner.begin is not None
         self.plans_together = self.together and learner.plans
         self.n_numbers = task.n_states * ROW  # of a table: state-action pairs, and unused
-        self.n_pairs = self.n_numbers * self.n_groups  # of all tables that ants of a world share
+        # Of all tables that ants of a world share: states, and pairs.
+        self.n_rows = task.n_states * self.n_groups
+        self.n_pairs = self.n_rows * ROW
 
         # By number of the pheromone, the trail first; only the views of cues are compiled.
         pheromones, pairs = task.pheromones_while(learns), task.all_cues
