@@ -12,12 +12,13 @@ from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.own_rules import difference
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features import FEATURES
+from taichi_ants.features.fields import OCCASIONS, TRAIL
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.rules.rule import Rule, drawn_parameters
+from taichi_ants.rules import Rule
+from taichi_ants.rules.rule import drawn_parameters
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.task.field import OCCASIONS, TRAIL
 from taichi_ants.worlds import World
 
 SEEDS, TICKS = 6, 60

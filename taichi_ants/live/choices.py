@@ -18,11 +18,11 @@ from taichi_ants import learners, worlds
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect
 from taichi_ants.features import FEATURES
+from taichi_ants.features.rule import Parameters
 from taichi_ants.features.support import refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
 from taichi_ants.live.setup import FORM_SUPPORTS, MOST_ANTS, MOST_TEXT, Setup
-from taichi_ants.rules.rule import Parameters
 from taichi_ants.settings import MISSING, DeclaredSetting, Named, all_of, declared, flat, nested
 from taichi_ants.task import Task, observations
 

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.choice import facts_of
 from taichi_ants.reference.features import inputs_of
 from taichi_ants.reference.features.castes import lays
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick
-from taichi_ants.reference.world_state import WorldState, computed
-from taichi_ants.rules import Rule
+from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Task, Traffic
 from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, SEES_CUE, SEES_EMPTY, SEES_GOAL
 from taichi_ants.task.events import Event
@@ -223,14 +221,3 @@ def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
         ant.heading = (ant.heading + 3) % N_HEADINGS
         return Event.PICKED_UP
     return Event.FAILED
-
-
-def pay(world: WorldState, was: Ant, ant: Ant, rule: Rule, task: Task, tick: int) -> int:
-    """Return the reward of an ant by your rule, after the tick; `was` is the ant before it."""
-    inputs = {"paper_state": was.paper_state, "next_paper_state": ant.paper_state}
-    inputs |= {
-        "reward": ant.reward,
-        "event": ant.event,
-        **facts_of(world, ant, task, tick, ()),
-    }
-    return int(computed(rule, task.rules, inputs))

@@ -13,14 +13,15 @@ from taichi_ants.features.support import COLONY, refuse_unsupported
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_BORN, STREAM_QUEEN
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import frozen_policy
-from taichi_ants.reference.actions import Intent, carry_out, intend, pay
+from taichi_ants.reference.actions import Intent, carry_out, intend
 from taichi_ants.reference.ants import Ant, Transition, nest_of, starts
-from taichi_ants.reference.choice import choose_action, choose_by_rule, choose_cell
 from taichi_ants.reference.features import castes, hooks
+from taichi_ants.reference.features.choice import choose_action, choose_cell
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS, learn_together
 from taichi_ants.reference.observations import OBSERVATIONS, codes_in_view, observe, yours
+from taichi_ants.reference.own_rules import choose_by_rule, pay
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_ants.errors import AntsError, as_array, expect
+from taichi_ants.features.fields import COMPASS, TRAIL
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.records import Snapshot
@@ -16,7 +17,6 @@ from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks
 from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, FOOD, N_ACTIONS, QUEEN
-from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.states import TASK_NAMES
 
 _PAPER = observations.get("paper")

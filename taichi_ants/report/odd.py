@@ -18,9 +18,9 @@ from taichi_ants.analysis.tables import Table
 from taichi_ants.errors import AntsError
 from taichi_ants.features import FEATURES
 from taichi_ants.features.feature import Feature
+from taichi_ants.features.rule import RULES
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
-from taichi_ants.rules.rule import RULES
 from taichi_ants.settings import DeclaredSetting, Named, Settings, all_of, declared, flat
 from taichi_ants.studies.folder import asked_in
 from taichi_ants.studies.sweep_file import KINDS, declaration_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from taichi_ants.features import used_by
+from taichi_ants.features.fields import COMPASS, TRAIL
 from taichi_ants.task.constants import ROW
-from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.task import Task
 
 

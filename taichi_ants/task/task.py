@@ -12,17 +12,17 @@ from typing import Annotated, Any, ClassVar, Literal
 from taichi_ants.errors import shown
 from taichi_ants.features import FEATURES, probabilities, used_by
 from taichi_ants.features.castes import ALL, NOTHING, Caste, parts_in
+from taichi_ants.features.choice import Choice
+from taichi_ants.features.fields import COMPASS, TRAIL, Field
 from taichi_ants.features.foods import Food
 from taichi_ants.features.labour import Labour
 from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
-from taichi_ants.rules.rule import Parameters, Rule, registered, words
+from taichi_ants.features.pheromone import Pheromone
+from taichi_ants.features.rule import Parameters, Rule, registered, words
 from taichi_ants.settings import Named, Setting, Settings, declared
 from taichi_ants.task import observations
-from taichi_ants.task.choice import Choice
-from taichi_ants.task.field import COMPASS, TRAIL, Field
 from taichi_ants.task.observations import Observation
-from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
 
 Delivery = Literal["terminates", "truncates"]

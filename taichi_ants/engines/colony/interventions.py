@@ -30,13 +30,13 @@ from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.errors import AntsError, as_array, count
+from taichi_ants.features.fields import TRAIL
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_INTERVENTION
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.interventions import Intervention, flat_indices
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
-from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import World, free_cells
 
 Change = Iterator[None]  # yields once, between its checks and its effects

@@ -36,6 +36,7 @@ from taichi_ants.engines.layout import compass_of, note_best_actions
 from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole
 from taichi_ants.features import arrays
 from taichi_ants.features.feature import ANT, CASTE, NEST, Array
+from taichi_ants.features.fields import TRAIL
 from taichi_ants.features.foods import food_numbers
 from taichi_ants.features.support import COLONY
 from taichi_ants.files.archives import Kind
@@ -48,7 +49,6 @@ from taichi_ants.records import Snapshot, same
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
 from taichi_ants.task.events import Event
-from taichi_ants.task.field import TRAIL
 from taichi_ants.task.model import Model
 from taichi_ants.worlds.world import Start, World
 

@@ -26,13 +26,13 @@ from taichi_ants.engines.colony.layout import ANT_GROUND, ANT_STANDS, TALLY_WIDT
 from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
 from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.engines.views import fill_codes
+from taichi_ants.features.fields import OCCASIONS
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task import constants
 from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, RIGHT
 from taichi_ants.task.events import Event
-from taichi_ants.task.field import OCCASIONS
 from taichi_ants.task.rules import actions, conflicts, policy, vision
 
 

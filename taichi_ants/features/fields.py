@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from enum import IntFlag
 from typing import Annotated, ClassVar, Literal
 
+from taichi_ants.features.pheromone import Pheromone
 from taichi_ants.grid.constants import TRAIL as TRAIL
 from taichi_ants.settings import Setting
-from taichi_ants.task.pheromone import Pheromone
 
 Laid = Literal["with_food", "without_food", "always", "dead_end", "failed_pick_up", "never"]
 COMPASS = "compass"  # the name of the cue that is not a pheromone

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from taichi_ants.features.castes import Attraction, Exponent, Temperature
-from taichi_ants.rules.rule import Rule, registered, words
+from taichi_ants.features.rule import Rule, registered, words
 from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
