@@ -254,7 +254,7 @@ class SetTrail(Intervention, path="trail", short_for=("level",)):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
-        check_one_of("`trail.field`", self.field, (TRAIL, *task.fields))
+        check_one_of("`trail.field`", self.field, (*task.pheromones,))
 
 
 @dataclass(frozen=True)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from taichi_ants.features.castes import Attraction, Exponent, Temperature
+from taichi_ants.features.castes import Attraction, Caste, Exponent, Temperature
+from taichi_ants.features.feature import Feature, Task
 from taichi_ants.features.rule import Rule, registered, words
 from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
-    import numpy as np
+    pass
 
 _CELLS = Setting(only=("rule", "deneubourg"))
 
@@ -78,8 +79,21 @@ class Choice(Settings, path="task.choice"):
             return "values" in self.own_rule.inputs
         return self.rule != "deneubourg"
 
-    def numbers(self) -> np.ndarray:
-        """Return temperature, k and exponent as kernels read them, float64 (3,); 0 is unused."""
-        import numpy as np
 
-        return np.array([self.temperature or 0.0, self.k or 0.0, self.exponent or 0.0])
+def _of_castes(name: str) -> Callable[[Task, Caste], float]:
+    """Return a function of a number of a caste, by default that of the task; 0 is unused."""
+
+    def of(task: Task, caste: Caste) -> float:
+        own = getattr(caste, name)
+        return (getattr(task.choice, name) or 0.0) if own is None else own
+
+    return of
+
+
+_NUMBERS = ("temperature", "k", "exponent")
+CHOICE = Feature(
+    Choice,
+    uses=lambda task: True,
+    numbers=_NUMBERS,
+    of_castes={name: _of_castes(name) for name in _NUMBERS},
+)

@@ -119,7 +119,7 @@ class Scene:
         expect("grid", grid, AxialGrid)
         expect("task", task, Task, type(None))
         self._task, self._title, self._overlay = task, title, overlay
-        fields = {} if task is None else {TRAIL: task.pheromone, **task.fields}
+        fields = {} if task is None else task.pheromones
         regular = ("none", "set", "fading")  # other deposits, and diffusion, have no usual levels
         scales = {
             name: rule.darkest if rule.deposit in regular and not rule.diffusion else None

@@ -283,7 +283,7 @@ class ColonyPoint:
     @property
     def seconds(self) -> float:
         """The approximate time of a seed on one processor."""
-        fields = [one for one in (self.task.pheromone, *self.task.fields.values()) if one.dense]
+        fields = [one for one in self.task.pheromones.values() if one.dense]
         work = sum(_WORK_OF_DIFFUSION if one.diffusion else _WORK_OF_A_CELL for one in fields)
         ants = self.ants + work * self.first_world.grid.size
         return ants * self.ticks * (self.episodes + self.rollouts) / _TICKS_OF_A_SECOND

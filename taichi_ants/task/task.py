@@ -182,7 +182,7 @@ class Task(Settings, path="task"):
                     "name."
                 )
         for what, field_name, *more in self._names_of_fields():
-            known = (*more, TRAIL, *self.fields)
+            known = (*more, *self.pheromones)
             if field_name is not None and field_name not in known:
                 yield (
                     f"{what} is {shown(field_name)}; it must be one of {', '.join(known)}, or the "
@@ -231,7 +231,7 @@ class Task(Settings, path="task"):
             for cue, more in _CUES.items():
                 yield f"`{path}.{cue}`", getattr(owner, cue), *more
             if isinstance(owner, Caste):
-                for name in owner.pheromones_laid((TRAIL, *self.fields)):
+                for name in owner.pheromones_laid([*self.pheromones]):
                     yield f"a name in `{path}.lays`", name, ALL, NOTHING
 
     @property
@@ -242,7 +242,7 @@ class Task(Settings, path="task"):
     @property
     def own_rules(self) -> tuple[Rule, ...]:
         """Your rules that the task uses, each once."""
-        pheromones = self.pheromone, *self.fields.values()
+        pheromones = self.pheromones.values()
         of_fields = [r for p in pheromones for r in (p.own_deposit, p.own_evaporation)]
         return tuple(
             dict.fromkeys(filter(None, (self.choice.own_rule, self.own_reward, *of_fields)))
@@ -260,11 +260,6 @@ class Task(Settings, path="task"):
         return task if parameters == {} else super(Task, task).replace(rules=parameters)
 
     @property
-    def has_loads(self) -> bool:
-        """Whether a cell can have more than one load of food."""
-        return any(food.loads > 1 for food in self.foods.values())
-
-    @property
     def food_changes(self) -> bool:
         """Whether food grows back or wanders."""
         grows = any(food.regrowth is not None for food in self.foods.values())
@@ -279,11 +274,6 @@ class Task(Settings, path="task"):
         """Return the numbers of the outbound and the homing cue of a caste, or of the task."""
         names = [getattr(caste, setting, None) or getattr(self, setting) for setting in _CUES]
         return self.number_of(names[0]), self.number_of(names[1])
-
-    def with_policies(self, policy: str) -> Task:
-        """Return the task with another policy for the castes that have one."""
-        follow = [name for name, caste in self.castes.items() if caste.policy is not None]
-        return self.replace(castes={name: {"policy": policy} for name in follow})
 
     @property
     def all_cues(self) -> tuple[tuple[int, int], ...]:
@@ -329,18 +319,23 @@ class Task(Settings, path="task"):
             **probabilities(self),
         }
 
+    @property
+    def pheromones(self) -> dict[str, Pheromone]:
+        """The trail, then the fields, by name."""
+        return {TRAIL: self.pheromone, **self.fields}
+
     def pheromones_while(self, learning: bool) -> tuple[Pheromone, ...]:
         """Return the trail, then the fields, for learning or evaluation, by number.
 
         They do not evaporate if that is off.
         """
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
-        pheromones = self.pheromone, *self.fields.values()
-        return pheromones if falls else tuple(pheromone.lasting for pheromone in pheromones)
+        pheromones = self.pheromones.values()
+        return tuple(pheromone if falls else pheromone.lasting for pheromone in pheromones)
 
     def number_of(self, cue: str) -> int:
         """Return the number of a pheromone: 0 for the trail, 1 for the first field; -1: compass."""
-        return -1 if cue == COMPASS else (TRAIL, *self.fields).index(cue)
+        return -1 if cue == COMPASS else [*self.pheromones].index(cue)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the task as names and numbers; `from_dict` reads it."""

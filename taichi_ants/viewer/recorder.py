@@ -18,7 +18,7 @@ from taichi_ants.errors import AntsError, count, expect
 from taichi_ants.features import used_by
 from taichi_ants.features.castes import update_weights_of
 from taichi_ants.features.feature import Feature, Mark
-from taichi_ants.features.fields import COMPASS, TRAIL
+from taichi_ants.features.fields import COMPASS
 from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
@@ -103,7 +103,7 @@ class Recorder:
         ants = "Ants" if changes else count(colony.ants, "ant")
         is_own = task.choice.own_rule or not task.sees.encode.__module__.startswith("taichi_ants.")
         by_letters = colony.has_training and not is_own and not task.noise.misread
-        names = (TRAIL, *task.fields, COMPASS)  # the number of the compass is -1
+        names = (*task.pheromones, COMPASS)  # the number of the compass is -1
         few, seen = self._n_states <= _MOST_NAMES, np.flatnonzero(self._known) % self._n_states
         named = range(self._n_states) if few else np.unique(seen).tolist()
         return {
@@ -259,7 +259,7 @@ class Recorder:
         sections["cells"] = snapshot.ant_cells[order]
         carrying, nests = snapshot.ant_carries[order], snapshot.ant_nests[order]
         sections["poses"] = snapshot.ant_headings[order] + 8 * carrying + 16 * nests
-        if colony.task.castes or colony.n_kinds > 1:
+        if colony.task.castes or colony.model.n_kinds > 1:
             foods = np.maximum(snapshot.ant_foods[order], 0)
             sections["groups"] = snapshot.ant_castes[order] + 16 * foods
         if self._marks:

@@ -24,7 +24,7 @@ from taichi_ants.engines.colony import columns, layout, trail
 from taichi_ants.engines.colony.columns import function, nest_of, of_caste, put, trait
 from taichi_ants.engines.colony.layout import ANT_GROUND, ANT_STANDS, TALLY_WIDTH, CasteRow, Tally
 from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
-from taichi_ants.engines.colony.views import ant_view
+from taichi_ants.engines.colony.views import ant_view, cell_view
 from taichi_ants.engines.views import fill_codes
 from taichi_ants.features.fields import OCCASIONS
 from taichi_ants.grid.constants import N_HEADINGS
@@ -360,7 +360,7 @@ def explore_below_of(c, v, w, ant):
 @function
 def choice_number(c, v, ant, row):
     """Return a number of the rule by which an ant chooses, f64; `row` is a `CasteRow`."""
-    number = c.choice[row - CasteRow.TEMPERATURE]
+    number = c.choice_numbers[row - CasteRow.TEMPERATURE]
     if ti.static(v.n_castes > 0):
         number = of_caste(c, ant, row)
     return number
@@ -679,14 +679,8 @@ def event_reward(c, v, ant):
     """Return the reward of the last event of an ant by the settings of the task, i32."""
     event = trait(c.event, ant)
     reward = c.rewards[event]
-    if ti.static(v.has_foods):
-        if (event == Event.PICKED_UP) | (event == Event.DELIVERED):
-            kind = 0
-            if ti.static(v.n_kinds > 1):
-                kind = trait(c.kind, ant)
-            reward = c.food_numbers[layout.FoodRow.PICK_UP, kind]
-            if event == Event.DELIVERED:
-                reward = c.food_numbers[layout.FoodRow.DELIVER, kind]
+    for pays in ti.static(v.at["pays"]):
+        reward = pays(ant_view(c, v, None, ant), event, reward)
     return reward
 
 
@@ -694,11 +688,8 @@ def event_reward(c, v, ant):
 def take_load(c, v, ant, index, tick):
     """Take a load of food from a cell, which becomes empty with its last load."""
     loads_left = 0
-    if ti.static(v.n_kinds > 1):
-        put(c.kind, ant, ti.cast(c.kind_of[index], ti.i32))
-    if ti.static(v.has_loads):
-        loads_left = c.loads[index] - 1
-        c.loads[index] = loads_left
+    for took in ti.static(v.at["took"]):
+        loads_left = took(ant_view(c, v, None, ant), cell_view(c, v, index), loads_left)
     if loads_left == 0:
         c.ground[index] = EMPTY
         take_from_source(c, index, tick)

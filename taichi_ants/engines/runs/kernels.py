@@ -63,9 +63,9 @@ def run_kernel(
         rng, values = advance(ant.random_state), values_of(a.q, begin, state)
         action, chance = 0, ti.f64(0.0)
         if ti.static(rules.softly):
-            action = choose_softly(values, bits_of(rng), explore_below, a.choice[0])
+            action = choose_softly(values, bits_of(rng), explore_below, a.choice_numbers[0])
             if ti.static(traced):
-                chance = chance_of_softly(values, action, explore_below, a.choice[0])
+                chance = chance_of_softly(values, action, explore_below, a.choice_numbers[0])
         else:
             action = choose(values, bits_of(rng), explore_below)
             if ti.static(traced):
