@@ -23,6 +23,13 @@ if TYPE_CHECKING:
 FEATURES: tuple[Feature, ...] = (
     *(KINDS, LOADS, FOODS, PAID, CASTES, CHOICE, LABOUR, SLIP, MISREAD, AGE),
 )
+# The places of numbers of castes in the numbers of the task, which ants without castes have.
+NUMBERS = {
+    name: (f"{feature.group}_numbers", feature.numbers.index(name))
+    for feature in FEATURES
+    for name in feature.of_castes
+    if name in feature.numbers
+}
 INPUTS = {name: read for feature in FEATURES for name, read in feature.inputs.items()}
 
 

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from taichi_ants.errors import shown
 from taichi_ants.features.castes import Attraction, Caste, Exponent, Temperature
 from taichi_ants.features.feature import Feature, Task
+from taichi_ants.features.fields import COMPASS
 from taichi_ants.features.rule import Rule, registered, words
-from taichi_ants.settings import Setting, Settings
+from taichi_ants.settings import Setting, Settings, declared
 
 if TYPE_CHECKING:
-    pass
+    import numpy as np
 
-_CELLS = Setting(only=("rule", "deneubourg"))
+WITHOUT_VALUES = ("deneubourg",)  # rules without action values and exploration
+_CELLS = Setting(only=("rule", *WITHOUT_VALUES))
 
 
 @dataclass(frozen=True)
@@ -72,12 +75,24 @@ class Choice(Settings, path="task.choice"):
         """Your rule, if it is one."""
         return registered("choice", self.rule)
 
+    def weights(self, values: np.ndarray) -> np.ndarray | None:
+        """Return numbers proportional to the probabilities of actions without exploration.
+
+        float64 (..., 5); None if ants take one of the best actions.
+        """
+        import numpy as np
+
+        largest = values.max(axis=-1, keepdims=True)
+        if self.rule == "softmax":
+            return np.exp((values.astype(float) - largest) / self.temperature)
+        return None
+
     @property
     def needs_table(self) -> bool:
         """Whether ants choose by action values."""
         if self.own_rule is not None:
             return "values" in self.own_rule.inputs
-        return self.rule != "deneubourg"
+        return self.rule not in WITHOUT_VALUES
 
 
 def _of_castes(name: str) -> Callable[[Task, Caste], float]:
@@ -91,9 +106,39 @@ def _of_castes(name: str) -> Callable[[Task, Caste], float]:
 
 
 _NUMBERS = ("temperature", "k", "exponent")
+# Settings of castes that need a table of action values, or certain rules of choice.
+_OF_TABLES = ("policy", "epsilon", "epsilon_spread", "learning_rate", "discount")
+_OF_RULES = {one.name: one.rule.only or () for one in declared(Choice) if one.name in _NUMBERS}
+
+
+def _faults(task: Task) -> Iterator[str]:
+    choice = task.choice
+    without_states = choice.rule in WITHOUT_VALUES or (choice.own_rule and task.noise.misread)
+    if without_states and task.observation != "paper":
+        yield (
+            f"`task.observation` is {task.observation!r}; it must be 'paper' if `task.choice.rule` "
+            f"is {choice.rule!r} and `task.noise.misread` {task.noise.misread}."
+        )
+    if choice.carriers_follow is not None and task.homing_cue != COMPASS:
+        yield (
+            f"`task.choice.carriers_follow` is {choice.carriers_follow!r}, but `task.homing_cue` "
+            f"is {task.homing_cue!r}, which ants with food follow already; leave one of them out."
+        )
+    unused = [] if choice.needs_table else [*_OF_TABLES]
+    unused += [name for name, rules in _OF_RULES.items() if choice.rule not in rules]
+    for name, caste in task.castes.items():
+        for setting in unused:
+            if getattr(caste, setting) is not None:
+                yield (
+                    f"`task.castes.{name}.{setting}` is {shown(getattr(caste, setting))}; leave it "
+                    f"out, because `task.choice.rule` is {choice.rule!r}."
+                )
+
+
 CHOICE = Feature(
     Choice,
     uses=lambda task: True,
     numbers=_NUMBERS,
     of_castes={name: _of_castes(name) for name in _NUMBERS},
+    faults=_faults,
 )

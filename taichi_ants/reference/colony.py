@@ -16,7 +16,7 @@ from taichi_ants.learners.policies import frozen_policy
 from taichi_ants.reference.actions import Intent, carry_out, intend
 from taichi_ants.reference.ants import Ant, Transition, nest_of, starts
 from taichi_ants.reference.features import castes, hooks
-from taichi_ants.reference.features.choice import choose_action, choose_cell
+from taichi_ants.reference.features.choice import choose
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, kinds_of_food, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS, learn_together
@@ -253,17 +253,12 @@ class ReferenceColony:
         return any(results)
 
     def _draw_action(self, ant: Ant, tick: int) -> int:
-        caste, choice = self.castes[ant.caste], self.task.choice
-        for name in ("temperature", "k", "exponent"):
-            if (number := getattr(caste, name)) is not None:
-                choice = replace(choice, **{name: number})
-        if choice.rule == "deneubourg":
-            return choose_cell(self.world, ant, choice, self.task.traffic)
+        choice = self.task.choice
         values = self.learners[self.table_of(ant)].rows[ant.state] if choice.needs_table else []
-        epsilon = castes.epsilon_of(caste, ant, self.epsilon)
+        epsilon = castes.epsilon_of(self.castes[ant.caste], ant, self.epsilon)
         if choice.own_rule is not None:
             return choose_by_rule(self.world, ant, self.task, values, epsilon, tick)
-        return choose_action(values, epsilon, ant.stream, choice)
+        return choose(self.world, ant, self.task, values, epsilon)
 
     def _count(self, before: Sequence[Ant], acting: Sequence[Ant]) -> None:
         """Record what happened in the tick, and store and use what each nest got."""

@@ -17,6 +17,7 @@ from taichi_ants import files, learners
 from taichi_ants.analysis.tables import Table
 from taichi_ants.errors import AntsError
 from taichi_ants.features import FEATURES
+from taichi_ants.features.choice import WITHOUT_VALUES
 from taichi_ants.features.feature import Feature
 from taichi_ants.features.rule import RULES
 from taichi_ants.learners.config import TrainingConfig
@@ -110,7 +111,7 @@ class Model:
         if own == "distribution" and row["task.labour.rule"] == "none":
             return False
         if name == "evaluation_epsilon":
-            return row["task.choice.rule"] != "deneubourg"
+            return row["task.choice.rule"] not in WITHOUT_VALUES
         if setting is None or setting.rule.only is None:
             return True
         other, *needed = setting.rule.only

@@ -20,19 +20,12 @@ from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
 from taichi_ants.features.pheromone import Pheromone
 from taichi_ants.features.rule import Parameters, Rule, registered, words
-from taichi_ants.settings import Named, Setting, Settings, declared
+from taichi_ants.settings import Named, Setting, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rewards import Rewards
 
 Delivery = Literal["terminates", "truncates"]
-# Settings of castes that need a table of action values, or certain rules of choice.
-_OF_TABLES = ("policy", "epsilon", "epsilon_spread", "learning_rate", "discount")
-_OF_CHOICE = {
-    setting.name: setting.rule.only[1:]
-    for setting in declared(Choice)
-    if setting.rule.only and setting.name in Caste.__dataclass_fields__
-}
 _CUES = {"outbound_cue": (), "homing_cue": (COMPASS,)}  # with cues that are not pheromones
 
 
@@ -161,20 +154,6 @@ class Task(Settings, path="task"):
         object.__setattr__(self, "rules", Named({**used, **others}))
 
     def _faults(self) -> Iterator[str]:
-        choice = self.choice
-        without_states = choice.rule == "deneubourg" or (choice.own_rule and self.noise.misread)
-        if without_states and self.observation != "paper":
-            yield (
-                f"`task.observation` is {self.observation!r}; it must be 'paper' if "
-                f"`task.choice.rule` is {choice.rule!r} and `task.noise.misread` "
-                f"{self.noise.misread}."
-            )
-        if choice.carriers_follow is not None and self.homing_cue != COMPASS:
-            yield (
-                f"`task.choice.carriers_follow` is {choice.carriers_follow!r}, but "
-                f"`task.homing_cue` is {self.homing_cue!r}, which ants with food follow already; "
-                "leave one of them out."
-            )
         for name in (TRAIL, COMPASS, ALL, NOTHING):  # the last two have a meaning in `lays`
             if name in self.fields:
                 yield (
@@ -193,15 +172,6 @@ class Task(Settings, path="task"):
         nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
         for nest in (nests or {0}) if self.castes else ():
             parts_in(self.castes, nest)  # raises AntsError
-        unused = [] if choice.needs_table else [*_OF_TABLES]
-        unused += [name for name, rules in _OF_CHOICE.items() if choice.rule not in rules]
-        for name, caste in self.castes.items():
-            for setting in unused:
-                if getattr(caste, setting) is not None:
-                    yield (
-                        f"`task.castes.{name}.{setting}` is {shown(getattr(caste, setting))}; "
-                        f"leave it out, because `task.choice.rule` is {choice.rule!r}."
-                    )
         rules = {rule.name: rule for rule in self.own_rules}
         for name in self.rules:
             if name not in rules:

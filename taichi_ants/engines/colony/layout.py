@@ -9,7 +9,6 @@ from typing import Any
 from taichi_ants.errors import check_one_of
 from taichi_ants.features import arrays
 from taichi_ants.features.castes import CASTES
-from taichi_ants.features.choice import CHOICE
 from taichi_ants.features.feature import ANT, Array
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
 from taichi_ants.task.model import Model
@@ -140,7 +139,7 @@ def _rows(names: Iterable[str]) -> Any:
 
 
 # Rows of `castes`, one column for each caste; numbers of other features follow.
-CasteRow = _rows((*CASTES.of_castes, *CHOICE.of_castes))
+CasteRow = _rows(CASTES.of_castes)
 
 
 class FoodSourceRow(IntEnum):

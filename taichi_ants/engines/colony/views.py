@@ -8,13 +8,13 @@ from taichi.lang.impl import subscript
 
 from taichi_ants.engines.colony import columns
 from taichi_ants.engines.colony.layout import COLUMNS, NestRow, WorldRow
-from taichi_ants.features import arrays, numbers_of_castes
+from taichi_ants.features import NUMBERS, arrays, numbers_of_castes
 from taichi_ants.features.castes import CASTE
 from taichi_ants.features.feature import ANT, CELL, NEST
 from taichi_ants.kernel_functions import Named, while_compiling
 from taichi_ants.task.model import Model
 
-WORLD = "world"
+WORLD, TASK = "world", "task"
 
 
 def entries_of(model: Model) -> dict[str, Any]:
@@ -22,14 +22,15 @@ def entries_of(model: Model) -> dict[str, Any]:
 
     That is an array, per what, and the row in it; or the start of an array that it does not use.
     """
-    of_castes = numbers_of_castes(model.features) if model.n_castes else {}
+    of_castes = numbers_of_castes(model.features)
     return {
         **{name: (name, ANT, None) for name in COLUMNS},
         "stream": ("streams", ANT, None),
         "seed": ("seeds", WORLD, None),
         **{row.name.lower(): ("worlds", WORLD, row) for row in WorldRow},
         **{row.name.lower(): ("nests", NEST, row) for row in NestRow},
-        **{name: ("castes", CASTE, row) for row, name in enumerate(of_castes)},
+        **{name: (array, TASK, place) for name, (array, place) in NUMBERS.items()},
+        **{name: ("castes", CASTE, row) for row, name in enumerate(of_castes) if model.n_castes},
         **{
             array.name: (array.name, array.per, None) if feature in model.features else array.start
             for feature, array in arrays()
@@ -71,8 +72,8 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None, cell: Any =
         if not isinstance(v.entries[name], tuple):
             return v.entries[name]
         array, per, row = v.entries[name]
-        at = (index(per),) if row is None else (row, index(per))
-        return subscript(None, getattr(c, array), *at)
+        at = () if per == TASK else (index(per),)
+        return subscript(None, getattr(c, array), *(at if row is None else (row, *at)))
 
     return Named(read)
 

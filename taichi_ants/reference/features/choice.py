@@ -7,16 +7,31 @@ word decides whether the ant explores, slips or misreads; its low word decides e
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from taichi_ants.reference.ants import Ant
+from taichi_ants.reference.features.castes import caste_of
 from taichi_ants.reference.observations import cells_in_view, ways
 from taichi_ants.reference.random_stream import WORDS, RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.rules.functions import exp, power
-from taichi_ants.task import Choice, Traffic
+from taichi_ants.task import Choice, Task, Traffic
 from taichi_ants.task.constants import GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT, SEES_GOAL
+
+
+def choose(
+    world: WorldState, ant: Ant, task: Task, values: Sequence[np.float32], epsilon: float
+) -> int:
+    """Return the action of an ant by a built-in rule, with the numbers of its caste."""
+    choice, caste = task.choice, caste_of(task, ant)
+    for name in ("temperature", "k", "exponent"):
+        if (number := getattr(caste, name)) is not None:
+            choice = replace(choice, **{name: number})
+    if choice.rule == "deneubourg":
+        return choose_cell(world, ant, choice, task.traffic)
+    return choose_action(values, epsilon, ant.stream, choice)
 
 
 def choose_action(
