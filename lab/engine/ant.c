@@ -173,6 +173,8 @@ static inline __attribute__((always_inline)) int train_run(const World *world, c
         }
         job->returns[(size_t)number * job->episodes + episode] = sum;
         job->steps[(size_t)number * job->episodes + episode] = step;
+        if (job->deliveries)
+            job->deliveries[(size_t)number * job->episodes + episode] = ant.delivered;
         double epsilon = run.epsilon * run.decay;
         run.epsilon = epsilon > run.min_epsilon ? epsilon : run.min_epsilon;
     }

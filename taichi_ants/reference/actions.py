@@ -15,8 +15,7 @@ from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Traffic
-from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, SEES_CUE, SEES_EMPTY, SEES_GOAL
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, SEES_CUE, SEES_EMPTY, SEES_GOAL, Event
 
 # The field of `Rewards` for each event.
 PAID = {

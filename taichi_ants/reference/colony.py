@@ -25,8 +25,7 @@ from taichi_ants.reference.own_rules import choose_by_rule, pay
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task
-from taichi_ants.task.constants import EMPTY, FOOD, GIVE, PICK_UP
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, FOOD, GIVE, PICK_UP, Event
 from taichi_ants.worlds.world import World
 
 

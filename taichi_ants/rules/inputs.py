@@ -27,7 +27,7 @@ _OF_ANTS = {  # of all kinds of rules that ants follow
 }
 _OF_ACTIONS = {  # of rules that are called after an action
     "carries": Input("1 if the ant has food after its action, else 0"),
-    "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
+    "event": Input("result of the ant's action, see `taichi_ants.task.constants.Event`"),
     "paper_state": Input("the paper's state of the ant before its action, 0 to 127"),
     **_OF_ANTS,
 }

@@ -21,8 +21,7 @@ from taichi_ants.features.feature import Feature, Mark
 from taichi_ants.features.fields import COMPASS
 from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
-from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS, Event
 from taichi_ants.viewer.frames import pack, types_of
 from taichi_ants.viewer.page import Recording
 

@@ -31,8 +31,7 @@ from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task import constants
-from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, RIGHT
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, RIGHT, Event
 from taichi_ants.task.rules import actions, conflicts, policy, vision
 
 

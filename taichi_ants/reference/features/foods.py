@@ -6,7 +6,7 @@ from typing import Any
 
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import Event
 
 
 def born(colony: Any, ant: Ant) -> None:
