@@ -56,7 +56,7 @@ def _faults(task: Task) -> Iterator[str]:
             f"`task.life.regrowth` is {task.life.regrowth}; with `task.foods`, set the regrowth of "
             "each kind instead."
         )
-    if task.life.pile_move_interval and (KINDS.is_used(task) or LOADS.is_used(task)):
+    if task.life.pile_move_interval and HELD.is_used(task):
         yield (
             f"`task.life.pile_move_interval` is {task.life.pile_move_interval}; only food of one "
             "kind with one load in a cell can wander, so leave it out."
@@ -94,7 +94,7 @@ def _shown(state: State, w: int, slots: np.ndarray, is_food: np.ndarray) -> dict
     """Return the kinds of food that ants carry, -1 without food, and those of cells."""
     import numpy as np
 
-    kinds = state.part("kind_of", w) if KINDS in state.model.features else np.uint8(0)
+    kinds = state.part("kind_of", w) if HELD in state.model.features else np.uint8(0)
     return {
         "ant_foods": np.where(state.carrying[w, slots], state.kinds[w, slots], np.int32(-1)),
         "food_kinds": np.where(is_food, kinds, np.uint8(0)),
@@ -121,9 +121,10 @@ def _paid(state: State, rewards: np.ndarray) -> np.ndarray:
     """Return the rewards of ants, those for food by its kind."""
     import numpy as np
 
-    picked_up, delivered = _numbers(state.task)[[_PICK_UP, _DELIVER]][:, state.kinds]
-    rewards = np.where(state.events == _PICKED_UP, picked_up, rewards)
-    return np.where(state.events == _DELIVERED, delivered, rewards)
+    for event, row in ((_PICKED_UP, _PICK_UP), (_DELIVERED, _DELIVER)):
+        by_kind = _numbers(state.task)[row, state.kinds]
+        rewards = np.where(state.events == event, by_kind, rewards)
+    return rewards
 
 
 PAID = Feature(Food, uses=lambda task: bool(task.foods), paid=_paid)
@@ -146,72 +147,46 @@ def wait(cell, kind, ticks):
     return cell.food_numbers[_REGROWTH, kind]
 
 
-# Several kinds: that of the food in each cell, and that of the last food that an ant picked up.
+# Several kinds or loads: what cells hold, and the kind of the last food that an ant picked up.
 
-KINDS = Feature(
+HELD = Feature(
     Food,
-    uses=lambda task: len(task.foods) > 1,
+    uses=lambda task: len(task.foods) > 1 or any(one.loads > 1 for one in task.foods.values()),
     arrays=(
         Array("kind", ANT, "i1", "kinds", "i4"),
         Array("kind_of", CELL, "u1", always=True),
+        Array("loads", CELL, "i4", always=True),
     ),
-    filled=lambda state, kinds: {"kind_of": kinds},
+    filled=lambda state, kinds: {"kind_of": kinds, "loads": _numbers(state.task)[_LOADS, kinds]},
 )
 
 
-@KINDS.at("born")
+@HELD.at("born")
 def begin(a):
     """Forget the food of the ant that had the slot before."""
     a.kind = 0
 
 
-@KINDS.at("took")
-def take_kind(a, cell, left):
-    """Note the kind of the food."""
+@HELD.at("took")
+def take(a, cell, left):
+    """Take one of the loads, and note its kind."""
+    left = cell.loads - 1
+    cell.loads = left
     a.kind = ti.cast(cell.kind_of, ti.i8)
     return left
 
 
-@KINDS.at("dropped")
-def drop_kind(a, cell):
-    """Leave the kind of the food."""
+@HELD.at("dropped")
+def drop(a, cell):
+    """Leave one load of the kind."""
+    cell.loads = 1
     cell.kind_of = ti.cast(a.kind, ti.u8)
 
 
-@KINDS.at("filled")
-def fill_kind(cell, kind, n):
-    """Set the kind of the food."""
-    cell.kind_of = ti.cast(kind, ti.u8)
-    return n
-
-
-# Several loads in a cell.
-
-LOADS = Feature(
-    Food,
-    uses=lambda task: any(food.loads > 1 for food in task.foods.values()),
-    arrays=(Array("loads", CELL, "i4", always=True),),
-    filled=lambda state, kinds: {"loads": _numbers(state.task)[_LOADS, kinds]},
-)
-
-
-@LOADS.at("took")
-def take_load(a, cell, left):
-    """Take one of the loads."""
-    left = cell.loads - 1
-    cell.loads = left
-    return left
-
-
-@LOADS.at("dropped")
-def drop_load(a, cell):
-    """Leave one load."""
-    cell.loads = 1
-
-
-@LOADS.at("filled")
-def fill_loads(cell, kind, n):
-    """Give the cell all loads."""
+@HELD.at("filled")
+def fill(cell, kind, n):
+    """Give the cell all loads of a kind."""
     n = cell.food_numbers[_LOADS, kind]
     cell.loads = n
+    cell.kind_of = ti.cast(kind, ti.u8)
     return n

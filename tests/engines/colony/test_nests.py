@@ -10,7 +10,7 @@ from random_colonies import RandomColony, random_colony, with_nests
 
 from taichi_ants import AntsError, Colony, Life, Task, TrainingConfig, World
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.features.foods import LOADS
+from taichi_ants.features.foods import HELD
 from taichi_ants.interventions import AddAnts, Place, RemoveAnts
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.protocol import At
@@ -83,7 +83,7 @@ def loads_of(colony: Colony, world: int) -> np.ndarray:
     """The loads in cells and of living carriers, by kind."""
     size, kinds = colony.grid.size, np.zeros(colony.model.n_kinds, int)
     here = np.flatnonzero(colony.snapshot(world).ground == FOOD) + world * size
-    loads = colony.arrays["loads"][here] if LOADS.is_used(colony.task) else 1
+    loads = colony.arrays["loads"][here] if HELD.is_used(colony.task) else 1
     np.add.at(kinds, colony.arrays["kind_of"][here], loads)
     carries = colony.living[world] & (
         colony.arrays["carries"].reshape(colony.living.shape)[world] == 1
