@@ -132,10 +132,10 @@ def checked_training(
     """Return the training of a colony, complete, or None if there are no action values."""
     learns = sharing != "frozen"
     if training is None and not learns and not has_table:
-        if task.choice.needs_table:
+        if task.needs_table:
             refuse_unsupported("a colony with given actions", task.uses(), BASE - CASTES)
         return None
-    if not task.choice.needs_table:
+    if not task.needs_table:
         raise AntsError(
             f"`task.choice.rule` is {task.choice.rule!r}, so ants choose without action values, "
             f"but sharing is {shown(sharing)} and there is a training or q_values; set sharing to "

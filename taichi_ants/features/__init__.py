@@ -9,6 +9,7 @@ from taichi_ants.features.castes import CASTES
 from taichi_ants.features.castes import numbers_of_castes as numbers_of_castes
 from taichi_ants.features.choice import CHOICE
 from taichi_ants.features.feature import Array, Feature, Task
+from taichi_ants.features.fields import FIELDS
 from taichi_ants.features.foods import FOODS, HELD, PAID
 from taichi_ants.features.labour import LABOUR
 from taichi_ants.features.life import AGE
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
     import numpy as np
 
 # In the order of their hooks, which is the order of random draws.
-FEATURES: tuple[Feature, ...] = (*(HELD, FOODS, PAID, CASTES, CHOICE, LABOUR, SLIP, MISREAD, AGE),)
+FEATURES: tuple[Feature, ...] = (
+    *(HELD, FOODS, PAID, CASTES, CHOICE, FIELDS, LABOUR, SLIP, MISREAD, AGE),
+)
 # The places of numbers of castes in the numbers of the task, which ants without castes have.
 NUMBERS = {
     name: (f"{feature.group}_numbers", feature.numbers.index(name))

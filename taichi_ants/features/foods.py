@@ -94,10 +94,9 @@ def _shown(state: State, w: int, slots: np.ndarray, is_food: np.ndarray) -> dict
     """Return the kinds of food that ants carry, -1 without food, and those of cells."""
     import numpy as np
 
-    kinds = state.part("kind_of", w) if HELD in state.model.features else np.uint8(0)
     return {
         "ant_foods": np.where(state.carrying[w, slots], state.kinds[w, slots], np.int32(-1)),
-        "food_kinds": np.where(is_food, kinds, np.uint8(0)),
+        "food_kinds": np.where(is_food, state.food_kinds[w], 0).astype(np.uint8),
     }
 
 
@@ -154,8 +153,8 @@ HELD = Feature(
     uses=lambda task: len(task.foods) > 1 or any(one.loads > 1 for one in task.foods.values()),
     arrays=(
         Array("kind", ANT, "i1", "kinds", "i4"),
-        Array("kind_of", CELL, "u1", always=True),
-        Array("loads", CELL, "i4", always=True),
+        Array("kind_of", CELL, "u1", "food_kinds", always=True),
+        Array("loads", CELL, "i4", words="food", unit="loads", always=True),
     ),
     filled=lambda state, kinds: {"kind_of": kinds, "loads": _numbers(state.task)[_LOADS, kinds]},
 )

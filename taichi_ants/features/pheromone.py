@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from taichi_ants.features.rule import BUILT_IN, Rule, registered, words
+from taichi_ants.features.rule import WORDS, Rule, registered, words
 from taichi_ants.settings import Setting, Settings, Share
 
 if TYPE_CHECKING:
     import numpy as np
 
 View = Literal["half", "strongest", "strongest_under_carriers"]
-DEPOSITS = BUILT_IN["deposit"]
+DEPOSITS = WORDS["deposit"]
 DEPOSIT_LEVEL = 250
 MAX_DEPOSIT = 1_000_000
 LINEAR = -1.0  # marks linear evaporation in place of a decay factor

@@ -11,7 +11,7 @@ from taichi_ants.features.feature import Input
 from taichi_ants.registry import Registry
 from taichi_ants.settings import Settings, declared
 
-BUILT_IN = {
+WORDS = {
     "choice": ("greedy", "softmax", "deneubourg"),
     "deposit": ("set", "add", "fading", "none"),
     "evaporation": ("linear", "exponential", "none"),
@@ -91,7 +91,7 @@ class Rule:
 # Built-in rules are words, which the engine implements.
 RULES: Registry[Rule] = Registry(
     *("rule", "taichi_ants.rules.register", {}),
-    reserved=[name for names in BUILT_IN.values() for name in names],
+    reserved=[name for names in WORDS.values() for name in names],
 )
 get = RULES.get
 
@@ -102,7 +102,7 @@ def _parameters(name: str, values: Mapping[str, Any]) -> Parameters:
 
 def registered(kind: str, name: str) -> Rule | None:
     """Return your rule of this name; None for the built-in rules of a kind."""
-    return None if name in BUILT_IN[kind] else get(name)
+    return None if name in WORDS[kind] else get(name)
 
 
 def names(kind: str | None = None) -> tuple[str, ...]:
@@ -112,4 +112,4 @@ def names(kind: str | None = None) -> tuple[str, ...]:
 
 def words(kind: str) -> tuple[str, ...]:
     """Return all words that name a rule of a kind: the built-in ones, then yours."""
-    return (*BUILT_IN[kind], *names(kind))
+    return (*WORDS[kind], *names(kind))

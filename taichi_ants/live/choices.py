@@ -229,7 +229,7 @@ def sliders(interventions: Interventions) -> dict[str, Value]:
     colony, pheromone = interventions.colony, interventions.colony.pheromones[0]
     living, rules = int(np.count_nonzero(colony.living[0])), "task.pheromone"
     values = {"ants": Value(max(living, 1), 1, colony.capacity, 1, "ants")}
-    if colony.task.choice.needs_table:
+    if colony.task.needs_table:
         values["epsilon"] = Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon")
     if colony.sharing != "frozen":
         values["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001, "learning_rate")

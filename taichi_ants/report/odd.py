@@ -271,7 +271,6 @@ class Model:
                 ("cell", f"level of `{field}`", number, "level"): True
                 for field in ("trail", *self.entries("fields"))
             },
-            ("cell", "food", number, "loads"): self.entries("foods"),
             ("nest", "food received", number, "items"): True,
             ("ant", "cell", "", ""): True,
             ("ant", "heading", "0 to 5, clockwise; 0 is up", "60 degrees"): True,

@@ -307,7 +307,7 @@ class ColonyPoint:
             least = 0.0 if self.policy else self.training.least_epsilon
             epsilon = least if self.evaluation_epsilon is None else self.evaluation_epsilon
             training = TrainingConfig.frozen(epsilon)
-        if not self.task.choice.needs_table:
+        if not self.task.needs_table:
             training = None
         options |= {"ants": self.ants, "capacity": self.capacity, "start": self.start}
         options |= {"sharing": self.sharing if learns else "frozen", "q_values": q_values}

@@ -154,12 +154,6 @@ class Task(Settings, path="task"):
         object.__setattr__(self, "rules", Named({**used, **others}))
 
     def _faults(self) -> Iterator[str]:
-        for name in (TRAIL, COMPASS, ALL, NOTHING):  # the last two have a meaning in `lays`
-            if name in self.fields:
-                yield (
-                    f"`task.fields` has a field {name!r}, but that name is taken; choose another "
-                    "name."
-                )
         for what, field_name, *more in self._names_of_fields():
             known = (*more, *self.pheromones)
             if field_name is not None and field_name not in known:
@@ -203,6 +197,11 @@ class Task(Settings, path="task"):
             if isinstance(owner, Caste):
                 for name in owner.pheromones_laid([*self.pheromones]):
                     yield f"a name in `{path}.lays`", name, ALL, NOTHING
+
+    @property
+    def needs_table(self) -> bool:
+        """Whether ants choose by action values."""
+        return self.choice.needs_table
 
     @property
     def own_reward(self) -> Rule | None:

@@ -52,7 +52,7 @@ def test_a_task_names_rules_and_their_parameters():
     assert list(greedy.rules) == ["weaker", "power_law"]
     assert greedy.replace(choice="weber").rules["weber"].k == 20.0
     assert task.pheromone.dense
-    assert not task.choice.needs_table
+    assert not task.needs_table
     assert Choice("restless").needs_table
 
 

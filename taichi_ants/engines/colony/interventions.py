@@ -88,8 +88,8 @@ class _World:
             return
         if what == QUEEN:
             number = int(np.argmax(self.queen_cells == cell))
-        if what == FOOD and self.colony.model.n_kinds > 1:
-            number = int(self.view("kind_of")[cell])
+        if what == FOOD:
+            number = int(self.colony.food_kinds[self.w, cell])
         yield from self._carry(cell, to, what, number)
 
     def trail(self, change: language.SetTrail) -> Change:

@@ -75,7 +75,9 @@ def _view_of(array: Array) -> property:
     def read(state: ColonyState) -> np.ndarray:
         shape = len(state.seeds), state.sizes[array.per]
         entries = state.arrays.get(array.name, state.arrays.get(array.instead))
-        entries = np.zeros(shape) if entries is None else entries.reshape(shape)
+        if entries is None or entries.size != math.prod(shape):
+            entries = np.zeros(shape)
+        entries = entries.reshape(shape)
         return entries.astype(array.shown_as) if array.shown_as else entries
 
     return property(read)
@@ -91,6 +93,7 @@ class ColonyState:
         is_given_actions: Whether ants take the actions passed to `Colony.act`.
         one_a_slot: Whether each slot has its own table of action values, not each world.
         n_nests: The number of nests in each world.
+        sizes: The numbers of slots, nests, cells, and what features count, in each world.
         pheromones: The trail, then the further fields, with or without evaporation, by number.
         memory: The size of the learner's memory for each table.
         stored: The names of the arrays in a file.
@@ -139,7 +142,7 @@ class ColonyState:
         self.sharing, self.learns = sharing, sharing != "frozen"
         given = arguments.checked_training(training, task, sharing, q_values is not None)
         self.has_training, self.training = given is not None, given or _NO_TRAINING
-        self.is_given_actions = task.choice.needs_table and not self.has_training
+        self.is_given_actions = task.needs_table and not self.has_training
         table = None if q_values is None else checked_values(q_values, task)
         self.seeds = arguments.checked_seeds(seeds)
         running = runtime.start(threads, arch)
@@ -236,12 +239,6 @@ class ColonyState:
         """The numbers of nests, and of groups in a nest, whose ants share a table."""
         by = (feature.tables_by for feature in self.model.features if feature.tables_by)
         return {NEST: self.n_nests, **{per: self.sizes[per] for per in by}}
-
-    @property
-    def sizes(self) -> dict[str, int]:
-        """The numbers of slots, nests, cells, and what features count, in each world."""
-        spaces = {per: of(self) for feature in FEATURES for per, of in feature.spaces.items()}
-        return {ANT: self.capacity, NEST: self.n_nests, CELL: self.grid.size, **spaces}
 
     @property
     def owners(self) -> int:
@@ -349,6 +346,9 @@ class ColonyState:
     def lay_out(self, worlds: tuple[World, ...]) -> None:
         """Make the arrays that depend on the worlds; AntsError if they have too few free cells."""
         self.worlds, self.grid = worlds, worlds[0].grid
+        self.sizes = {ANT: self.capacity, NEST: self.n_nests, CELL: self.grid.size}
+        for feature in FEATURES:
+            self.sizes |= {per: of(self) for per, of in feature.spaces.items()}
         for feature in self.model.features:
             for refusal in feature.refusals(self):
                 raise AntsError(refusal)
@@ -455,7 +455,7 @@ class ColonyState:
             self.first["nest"] = nests.astype(np.int8)
         for feature in model.features:
             self.first |= feature.columns(self)
-        ground, kinds = self._of_each(World.ground), self._of_each(World.kinds_by_cell)
+        ground, of_cells = self._of_each(World.ground), self._of_each(World.kinds_by_cell)
         is_food = ground == FOOD
         marks = (ANT_GROUND - (nests << 4)).astype(np.uint8)
         np.put_along_axis(ground, cells.astype(np.int64), marks, axis=1)
@@ -490,7 +490,7 @@ class ColonyState:
             **food_sources.arrays(foods, rows, n_food_sources, self.grid.size),
         }
         for feature in model.features:
-            for name, values in feature.filled(self, kinds).items():
+            for name, values in feature.filled(self, of_cells).items():
                 self.at_start[name][:] = np.where(is_food, values, 0).reshape(-1)
 
     def _pheromone_arrays(self, n: int) -> Arrays:
