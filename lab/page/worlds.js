@@ -44,7 +44,7 @@ const LAB = {
     {"name": "paper", "radius": 10, "queen": [-9, 0], "shapes": [
       [2, -8, 0, 0, 0, 16], [7, 9, 0, 0]
     ]},
-    {"name": "daily", "radius": 30, "queen": [-13, -15], "rocks": 40, "largest": 16, "piles": 2, "nearest": 28, "daily": true, "shapes": []}
+    {"name": "daily", "radius": 30, "queen": [-13, -15], "rocks": 36, "largest": 13, "piles": 2, "nearest": 28, "daily": true, "shapes": []}
   ]
 };
 export const FOLLOWERS = {

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from taichi_ants.errors import shown
 from taichi_ants.features.castes import Attraction, Caste, Exponent, Temperature
+from taichi_ants.features.cues import CUES
 from taichi_ants.features.feature import Feature, Task
-from taichi_ants.features.fields import COMPASS
 from taichi_ants.features.rule import Rule, registered, words
 from taichi_ants.settings import Setting, Settings, declared
 
@@ -119,7 +119,7 @@ def _faults(task: Task) -> Iterator[str]:
             f"`task.observation` is {task.observation!r}; it must be 'paper' if `task.choice.rule` "
             f"is {choice.rule!r} and `task.noise.misread` {task.noise.misread}."
         )
-    if choice.carriers_follow is not None and task.homing_cue != COMPASS:
+    if choice.carriers_follow is not None and task.homing_cue not in CUES:
         yield (
             f"`task.choice.carriers_follow` is {choice.carriers_follow!r}, but `task.homing_cue` "
             f"is {task.homing_cue!r}, which ants with food follow already; leave one of them out."

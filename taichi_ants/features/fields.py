@@ -11,13 +11,13 @@ from enum import IntFlag
 from typing import Annotated, ClassVar, Literal
 
 from taichi_ants.features.castes import ALL, NOTHING
+from taichi_ants.features.cues import CUES
 from taichi_ants.features.feature import Feature, Task
 from taichi_ants.features.pheromone import Pheromone
 from taichi_ants.grid.constants import TRAIL as TRAIL
 from taichi_ants.settings import Setting
 
 Laid = Literal["with_food", "without_food", "always", "dead_end", "failed_pick_up", "never"]
-COMPASS = "compass"  # the name of the cue that is not a pheromone
 
 
 class Occasion(IntFlag):
@@ -83,7 +83,7 @@ class Field(Pheromone, path="task.fields.NAME"):
 
 
 def _faults(task: Task) -> Iterator[str]:
-    for name in (TRAIL, COMPASS, ALL, NOTHING):  # the last two have a meaning in `lays`
+    for name in (TRAIL, *CUES, ALL, NOTHING):  # the last two have a meaning in `lays`
         if name in task.fields:
             yield f"`task.fields` has a field {name!r}, a name that is taken; choose another name."
 

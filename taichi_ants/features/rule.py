@@ -11,6 +11,7 @@ from taichi_ants.features.feature import Input
 from taichi_ants.registry import Registry
 from taichi_ants.settings import Settings, declared
 
+# The rules that the engine implements; built-in functions are in `rules/built_in.py`.
 WORDS = {
     "choice": ("greedy", "softmax", "deneubourg"),
     "deposit": ("set", "add", "fading", "none"),
@@ -46,7 +47,7 @@ class Parameters(Settings, path="task.rules.NAME"):
 
 @dataclass(frozen=True, eq=False)
 class Rule:
-    """A rule that you wrote: a function of inputs, and of parameters.
+    """A rule that you wrote, or a built-in one: a function of inputs, and of parameters.
 
     Attributes:
         name: The name that tasks use.
@@ -88,7 +89,7 @@ class Rule:
         return math.floor(result) if form.is_whole else result
 
 
-# Built-in rules are words, which the engine implements.
+# `rules/rule.py` adds the built-in functions.
 RULES: Registry[Rule] = Registry(
     *("rule", "taichi_ants.rules.register", {}),
     reserved=[name for names in WORDS.values() for name in names],
@@ -101,15 +102,15 @@ def _parameters(name: str, values: Mapping[str, Any]) -> Parameters:
 
 
 def registered(kind: str, name: str) -> Rule | None:
-    """Return your rule of this name; None for the built-in rules of a kind."""
+    """Return the rule of this name; None for the words that the engine implements."""
     return None if name in WORDS[kind] else get(name)
 
 
 def names(kind: str | None = None) -> tuple[str, ...]:
-    """Return the names of your rules, of one kind or of all, in the order of registration."""
-    return tuple(name for name, rule in RULES.yours.items() if kind in (None, rule.kind))
+    """Return the names of rules, of one kind or of all: built-in functions, then yours."""
+    return tuple(name for name in RULES.names() if kind in (None, get(name).kind))
 
 
 def words(kind: str) -> tuple[str, ...]:
-    """Return all words that name a rule of a kind: the built-in ones, then yours."""
+    """Return all words that name a rule of a kind, those that the engine implements first."""
     return (*WORDS[kind], *names(kind))

@@ -1,4 +1,4 @@
-"""The registration of rules that you write, and their trial on drawn inputs."""
+"""The registration of rules that are functions, and their trial on drawn inputs."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type
 from taichi_ants.errors import AntsError, check_one_of, shown, unusable
 from taichi_ants.features.feature import Input
 from taichi_ants.features.rule import RULES, Parameters, Rule
+from taichi_ants.rules.built_in import FUNCTIONS
 from taichi_ants.rules.inputs import KINDS, drawn, field_of, input_of, values_shown
 from taichi_ants.rules.language import LanguageError, kernel_source
 from taichi_ants.settings import Setting, declared
@@ -50,20 +51,25 @@ def register(
                 f"{called!r} is the name of a rule of the kind {RULES.yours[called].kind!r}; "
                 "choose another name."
             )
-        inputs, settings = _arguments(called, kind, function)
-        arguments = inspect.signature(function).parameters
-        lengths = {name: inputs[name].length if name in inputs else 0 for name in arguments}
-        fields = tuple(dict.fromkeys(filter(None, map(field_of, inputs))))
-        rule = Rule(called, kind, KINDS[kind], function, inputs, fields, settings)
-        try:
-            rule = replace(rule, source=kernel_source(function, lengths))
-        except LanguageError as error:
-            raise unusable(rule, error) from None
+        rule = _rule(called, kind, function)
         _try_in_python(rule)
         RULES.add(called, rule)
         return function
 
     return add
+
+
+def _rule(name: str, kind: str, function: Callable[..., Any]) -> Rule:
+    """Return a function as a rule; AntsError if kernels cannot compute it."""
+    inputs, settings = _arguments(name, kind, function)
+    arguments = inspect.signature(function).parameters
+    lengths = {name: inputs[name].length if name in inputs else 0 for name in arguments}
+    fields = tuple(dict.fromkeys(filter(None, map(field_of, inputs))))
+    rule = Rule(name, kind, KINDS[kind], function, inputs, fields, settings)
+    try:
+        return replace(rule, source=kernel_source(function, lengths))
+    except LanguageError as error:
+        raise unusable(rule, error) from None
 
 
 def _arguments(
@@ -101,7 +107,7 @@ def drawn_parameters(rule: Rule, rng: np.random.Generator) -> dict[str, Any]:
     for setting in declared(rule.settings):
         least, most = setting.rule.least, setting.rule.most
         if least is not None and most is not None and rng.random() < 0.5:
-            value = float(rng.choice([least, most, rng.uniform(least, most)]))
+            value = float((least, most, rng.uniform(least, most))[rng.integers(3)])
             values[setting.name] = round(value) if setting.kind is int else value
     return values
 
@@ -133,3 +139,10 @@ def _try_in_python(rule: Rule) -> None:
         if fault:
             must = f"it must return {kind.result.split(':')[0]}, {form}"
             raise unusable(rule, f"{fault} for {values_shown(values)}, but {must}")
+
+
+RULES.built_in = {
+    function.__name__: _rule(function.__name__, kind, function)
+    for kind, functions in FUNCTIONS.items()
+    for function in functions
+}

@@ -10,11 +10,12 @@ from taichi_ants.engines.colony import columns
 from taichi_ants.engines.colony.layout import COLUMNS, NestRow, WorldRow
 from taichi_ants.features import NUMBERS, arrays, numbers_of_castes
 from taichi_ants.features.castes import CASTE
+from taichi_ants.features.cues import CUES
 from taichi_ants.features.feature import ANT, CELL, NEST
 from taichi_ants.kernel_functions import Named, while_compiling
 from taichi_ants.task.model import Model
 
-WORLD, TASK = "world", "task"
+WORLD, TASK, MAP = "world", "task", "map"
 
 
 def entries_of(model: Model) -> dict[str, Any]:
@@ -35,6 +36,7 @@ def entries_of(model: Model) -> dict[str, Any]:
             array.name: (array.name, array.per, None) if feature in model.features else array.start
             for feature, array in arrays()
         },
+        **{name: (name, MAP, None) for cue in CUES.values() for name in cue.arrays},
     }
 
 
@@ -43,8 +45,8 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None, cell: Any =
 
     An attribute is an entry of an array, which can be assigned: by the slot of the ant, or by its
     nest, world or caste. Without `w`, the world is that of the ant. `task` has the settings that
-    features declare as numbers, for example `task.labour.demand`. Other names are those of the
-    arrays and numbers of kernels.
+    features declare as numbers, for example `task.labour.demand`, and `place` is the index of the
+    ant's cell in arrays by cell. Other names are those of the arrays and numbers of kernels.
     """
     if w is None and ant is not None:
         w = ant // c.n_slots
@@ -54,6 +56,8 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None, cell: Any =
             return w
         if per in (ANT, CELL):
             return ant if per == ANT else cell
+        if per == MAP:
+            return columns.own_map(c, v, w, ant)
         if per == CASTE:
             return columns.trait(c.caste, ant)
         number = columns.nest_of(c, v, ant) if nest is None else nest
@@ -67,6 +71,8 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None, cell: Any =
     def read(name: str) -> Any:
         if name == "task":
             return Named(group)
+        if name == "place":
+            return w * c.size + subscript(None, c.cell, ant)
         if name not in v.entries:
             return getattr(c, name)
         if not isinstance(v.entries[name], tuple):
