@@ -25,13 +25,13 @@ from taichi_ants import (
     rules,
 )
 from taichi_ants import task as tasks
+from taichi_ants.features.rule import RULES
 from taichi_ants.files import archives
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.live import session as session_module
 from taichi_ants.live.choices import sliders
 from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
-from taichi_ants.rules.rule import RULES
 from taichi_ants.settings import Setting
 from taichi_ants.viewer import Recording
 from taichi_ants.viewer.frames import CLOCK, POINT
