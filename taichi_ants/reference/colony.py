@@ -24,8 +24,7 @@ from taichi_ants.reference.observations import OBSERVATIONS, codes_in_view, obse
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task
-from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, Event
 from taichi_ants.worlds.world import World
 
 
