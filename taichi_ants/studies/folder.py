@@ -25,7 +25,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -245,12 +245,18 @@ def packages(also: Iterable[str] = ()) -> dict[str, str]:
     for name in waiting:  # which grows
         with suppress(metadata.PackageNotFoundError):
             if name not in versions:
-                versions[name] = metadata.version(name)
-                needed = (line for line in metadata.requires(name) or () if "extra ==" not in line)
-                names = (re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in needed)
-                waiting += [re.sub(r"[-_.]+", "-", name).lower() for name in names]
+                versions[name], needed = _installed(name)
+                waiting += needed
     versions.pop("taichi-ants", None)
     return {"taichi_ants": __version__, **dict(sorted(versions.items()))}
+
+
+@cache
+def _installed(name: str) -> tuple[str, list[str]]:
+    """Return the version of an installed package, and the packages that it needs."""
+    needed = (line for line in metadata.requires(name) or () if "extra ==" not in line)
+    names = (re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in needed)
+    return metadata.version(name), [re.sub(r"[-_.]+", "-", name).lower() for name in names]
 
 
 def processor() -> str:
