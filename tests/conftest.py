@@ -45,7 +45,7 @@ def _inside_class(level_of_class_stackframe: int) -> bool:
 
 
 def pytest_collection_finish() -> None:
-    """Exclude modules, tests and parameters from garbage collection, and collect the rest rarely."""
+    """Exclude modules, tests and parameters from garbage collection; collect the rest rarely."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000)
