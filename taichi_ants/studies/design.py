@@ -155,14 +155,10 @@ def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[dict
     draws = np.random.default_rng(RANDOM_SEED).integers(len(first), size=(len(first), 1000))
     rows = []
     for name, mixed in zip(names, between, strict=True):
-        found, resampled = (
-            _indices(first, mixed, last),
-            _indices(*(y[draws] for y in (first, mixed, last))),
-        )
-        ends = []
-        for index, of_resamples in zip(found, resampled, strict=True):
-            half = _NORMAL_95 * of_resamples.std(ddof=1)
-            ends += [float(each) for each in (index, index - half, index + half)]
+        found = np.array(_indices(first, mixed, last))
+        resampled = np.array(_indices(first[draws], mixed[draws], last[draws]))
+        half = _NORMAL_95 * resampled.std(axis=1, ddof=1)
+        ends = np.stack([found, found - half, found + half], axis=1).ravel().tolist()
         rows.append(dict(zip(COLUMNS, (measure, name, *ends), strict=True)))
     return rows
 
