@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -153,14 +154,18 @@ class Feature:
         """Return its settings in a task."""
         return getattr(task, self.group)
 
+    @cached_property
+    def _unused(self) -> Settings:
+        """The default settings, which mean that a task does not use the feature."""
+        return self.settings()
+
     def is_used(self, task: Task) -> bool:
         """Whether a task uses the feature."""
         if self.uses is not None:
             return self.uses(task)
-        chosen, default = self.of(task), self.settings()
         if self.switch:
-            return getattr(chosen, self.switch) != getattr(default, self.switch)
-        return chosen != default
+            return getattr(self.of(task), self.switch) != getattr(self._unused, self.switch)
+        return self.of(task) != self._unused
 
     def at(self, point: str) -> Callable[[Function], KernelFunction]:
         """Register a function as the hook at a point, as a decorator."""
