@@ -45,7 +45,7 @@ class CColony(ctypes.Structure):
         *((name, ctypes.c_int32) for name in ("size", "n")),
         *((name, ctypes.c_void_p) for name in ("ground", "trail", "closer", "steps")),
         *((name, ctypes.c_void_p) for name in ("cells", "headings", "random", "q")),
-        *((name, ctypes.c_int32) for name in ("states", "learner", "evaporates")),
+        *((name, ctypes.c_int32) for name in ("states", "evaporates")),
         *((name, ctypes.c_int32) for name in ("level", "slope", "fades_after")),
         ("discount", ctypes.c_float),
         ("explore_below", ctypes.c_uint64),

@@ -8,6 +8,7 @@ type checker. Fonts and WebAssembly are embedded in base64; the page needs no ne
 from __future__ import annotations
 
 import base64
+import json
 import re
 import sys
 from pathlib import Path
@@ -22,7 +23,7 @@ MODULES = (
     *("mind", "scenes", "daily", "brush", "controls", "train", "address", "film", "embed", "main"),
 )
 FONTS = (("Newsreader", "500", "newsreader.woff2"), ("Inter", "400 650", "inter.woff2"))
-BINARIES = {"COLONY": "colony.wasm", "ANT": "ant.wasm"}
+BINARIES = {"COLONY_WASM": "colony.wasm", "ANT_WASM": "ant.wasm"}
 _IMPORT = re.compile(r"^import\b[^;]*;\n", re.M)
 _NAME = re.compile(r"^(?:async )?(?:const|let|function|class) (\w+)", re.M)
 
@@ -50,13 +51,10 @@ def page() -> str:
         f'src: url(data:font/woff2;base64,{base64_of(PAGE / "fonts" / file)}) format("woff2"); }}\n'
         for name, weight, file in FONTS
     )
-    binaries = "".join(
-        f'const {name}_WASM = "{base64_of(LAB / "engine" / file)}";\n'
-        for name, file in BINARIES.items()
-    )
+    binaries = {name: base64_of(LAB / "engine" / file) for name, file in BINARIES.items()}
     parts = {
         "STYLE": faces + (PAGE / "style.css").read_text("utf-8"),
-        "SCRIPT": binaries + script(),
+        "SCRIPT": f"const BINARIES = {json.dumps(binaries)};\n{script()}",
     }
     whole = (PAGE / "page.html").read_text("utf-8")
     for name, text in parts.items():

@@ -21,6 +21,7 @@ from command_lines import ROOT
 from taichi_ants import AntsError, TrainingConfig, learners
 from taichi_ants.interventions import INTERVENTIONS, Clear
 from taichi_ants.protocol import EVENTS as EVENTS_BY_NAME
+from taichi_ants.rules.rule import RULES
 from taichi_ants.settings import (
     DeclaredSetting,
     Named,
@@ -241,6 +242,8 @@ def test_the_page_of_settings_is_made_from_the_declarations():
     page = (ROOT / "docs" / "settings.md").read_text()
     for kind in KINDS:
         assert table(kind) in page
+    for rule in RULES.built_in.values():
+        assert {*table(rule.settings).splitlines()} <= {*page.splitlines()}
     for name in learners.names():
         if declared(learners.get(name).hyperparameters):
             assert table(learners.get(name).hyperparameters) in page

@@ -29,18 +29,19 @@ static int omp_get_num_threads(void) { return 1; }
 #include <wasm_simd128.h>
 #endif
 
-/* The rules of a task, as bits. They are compile-time constants of the functions below, so that
- * each usual set of rules has a loop of its own. */
+/* The rules of a task and its learner, as bits. They are constants of the functions below, so that
+ * the compiler makes a loop for each usual set of rules. */
 enum {
     DIRECTED = 1,  /* trails rise towards food, and ants see only the strongest */
     SWAPS = 2,     /* ants with food push others aside */
     SEES_ANTS = 4, /* ants see each other */
     QUEUES = 8,    /* ants of a queue move at once; an ant sees which one to follow */
+    SARSA = 16,    /* ants learn by SARSA instead of Q-learning */
+    FROZEN = 32,   /* ants do not learn */
     PAPERS = 0,
     FORAGING = DIRECTED | SWAPS | SEES_ANTS,
     QUEUEING = FORAGING | QUEUES
 };
-enum { LEARNS_Q, LEARNS_SARSA, FROZEN };
 
 enum { EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13 };
 enum { LEFT, FORWARD, RIGHT, PICK_UP, GIVE, N_ACTIONS };
@@ -63,7 +64,7 @@ typedef struct {
     uint8_t *headings;
     uint64_t *random;
     float *q; /* (states, ROW) */
-    int32_t states, learner, evaporates;
+    int32_t states, evaporates;
     int32_t level, slope, fades_after;
     float discount;
     uint64_t explore_below;
@@ -80,8 +81,9 @@ typedef struct {
     uint64_t random;
     int32_t cell, carried;
     uint16_t state;
-    uint8_t heading, carries, percept, action, event;
-    uint8_t want; /* between two ticks: 0, or under SARSA 1 plus the next action */
+    uint8_t heading, carries, percept, action;
+    uint8_t want; /* under SARSA between two ticks: 1 plus the next action, or 0 */
+    uint8_t event;
 } Ant;
 
 /* The largest value of a state, and a bit for each action that has it. */
@@ -191,7 +193,7 @@ INLINE int level_of(const Colony *c, int cell, int clock)
     return level > 0 ? level : 0;
 }
 
-/* The percept of an ant, and the row of its table. */
+/* The percept of an ant, and if it sees ants the row of its table, which is the percept if not. */
 INLINE int see(const Colony *c, int rules, int cell, int heading, int carries, int clock, int *row)
 {
     int codes[3], levels[3] = {0}, ants[3], nearer, strongest;
@@ -219,7 +221,6 @@ INLINE int see(const Colony *c, int rules, int cell, int heading, int carries, i
         }
     }
     int percept = carries << 6 | codes[0] << 4 | codes[1] << 2 | codes[2];
-    *row = percept;
     if (rules & SEES_ANTS) {
         int index = carries, own = level_of(c, cell, clock);
         for (int k = 0; k < 3; k++) {
@@ -256,9 +257,9 @@ INLINE int state_of(int rules, const Ant *ant)
 
 INLINE void choose_and_want(const Colony *c, const Work *w, int rules, Ant *ant)
 {
-    int percept = ant->percept, action = ant->want - 1;
+    int percept = ant->percept, action = rules & SARSA ? ant->want - 1 : -1;
     uint64_t random = ant->random;
-    if (c->learner != LEARNS_SARSA || action < 0) {
+    if (action < 0) {
         random = advance(random);
         unsigned greedy = w->greedy[state_of(rules, ant)].actions;
         action = choose(greedy, bits_of(random), c->explore_below);
@@ -471,14 +472,16 @@ INLINE int sense_and_learn(const Colony *c, const Work *w, int rules, Ant *ant, 
 {
     int event = ant->event, next = 0, cell = ant->cell, drawn = 0;
     int percept = see(c, rules, cell, ant->heading, ant->carries, clock, &next);
+    if (!(rules & SEES_ANTS))
+        next = percept;
     float next_value = w->greedy[next].best;
-    if (c->learner == LEARNS_SARSA && event != DELIVERED) {
+    if ((rules & SARSA) && event != DELIVERED) {
         ant->random = advance(ant->random);
         int action = choose(w->greedy[next].actions, bits_of(ant->random), c->explore_below);
         next_value = c->q[next * ROW + action];
         drawn = 1 + action;
     }
-    if (c->learner != FROZEN) {
+    if (!(rules & FROZEN)) {
         int pair = state_of(rules, ant) * ROW + ant->action;
         float discount = event == DELIVERED ? 0.0f : c->discount;
         float error = (float)c->rewards[event] + discount * next_value - c->q[pair];
@@ -492,12 +495,13 @@ INLINE int sense_and_learn(const Colony *c, const Work *w, int rules, Ant *ant, 
     if (rules & SEES_ANTS)
         ant->state = next;
     w->wants[cell - (ant->want ? c->steps[ant->want] : 0)] = 0; /* its previous cell */
-    ant->want = drawn;
+    if (rules & SARSA)
+        ant->want = drawn;
     return n;
 }
 
 /* Note whose food was taken in a tick, and let food grow back on empty cells when it is time. */
-static void regrow(const Colony *c, int tick)
+INLINE void regrow(const Colony *c, int tick)
 {
     for (int k = 0; k < c->sources; k++) {
         int cell = c->source_at[k], taken = c->taken[cell];
@@ -616,7 +620,7 @@ static void pass_ticks(Colony *c, const Work *w, int rules, int tick, int ticks,
     else if (rules == QUEUEING)
         pass_as(c, w, QUEUEING, tick, ticks, threads);
     else
-        pass_as(c, w, rules, tick, ticks, threads); /* parts of foraging: bits known at run time */
+        pass_as(c, w, rules, tick, ticks, threads); /* others: bits known at run time */
 }
 
 /* Let all ants observe what is in view. */
@@ -626,7 +630,7 @@ static void look_around(const Colony *c, const Work *w, int rules, int clock)
         Ant *ant = w->ants + i;
         int row = 0;
         ant->percept = see(c, rules, ant->cell, ant->heading, ant->carries, clock, &row);
-        ant->state = row;
+        ant->state = rules & SEES_ANTS ? row : ant->percept;
     }
 }
 

@@ -65,9 +65,10 @@ static size_t share_memory(void)
  * if out of memory. The page then writes rocks, food and the queen into the ground. */
 EXPORT int lay_out(int x, int y, int z, int ants, int some_rules, int learner)
 {
-    G = grid_of(x, y, z), most = ants, rules = some_rules;
+    static const int bits[] = {0, SARSA, FROZEN};
+    G = grid_of(x, y, z), most = ants, rules = some_rules | bits[learner];
     free(memory), memory = NULL;
-    C = (Colony){.size = G.size, .learner = learner, .evaporates = 1};
+    C = (Colony){.size = G.size, .evaporates = 1};
     C.states = rules & QUEUES ? 686 : rules & SEES_ANTS ? 432 : 128;
     W = (Work){0};
     static int32_t steps[8];
@@ -324,7 +325,8 @@ EXPORT double count(int k) { return (double)C.counts[k]; }
 EXPORT void see_from(int cell, int heading, int carries)
 {
     int row = 0, base = rules & QUEUES ? 7 : rules & SEES_ANTS ? 6 : 4;
-    see(&C, rules, cell, heading, carries, tick, &row);
+    int percept = see(&C, rules, cell, heading, carries, tick, &row);
+    row = rules & SEES_ANTS ? row : percept;
     page.mind[0] = row, page.mind[1] = (int)W.greedy[row].actions;
     for (int k = 2; k >= 0; k--, row /= base) {
         page.mind[2 + k] = row % base;
@@ -338,9 +340,10 @@ EXPORT void read_mind(int i)
 {
     const Ant *ant = W.ants + i;
     see_from(ant->cell, ant->heading, ant->carries);
-    uint64_t bits = bits_of(ant->want ? ant->random : advance(ant->random)); /* drawn already? */
+    int drawn = rules & SARSA ? ant->want : 0;
+    uint64_t bits = bits_of(drawn ? ant->random : advance(ant->random));
     int action = choose(W.greedy[page.mind[0]].actions, bits, C.explore_below);
-    page.mind[9] = ant->want ? ant->want - 1 : action;
+    page.mind[9] = drawn ? drawn - 1 : action;
     page.mind[10] = bits >> 32 < C.explore_below;
 }
 

@@ -14,7 +14,8 @@ const NEAR = 3.5; // of an ant that is picked, in the unit of geometry.js
 export class Brush {
   /** @param {any} lab  @param {{canvas: HTMLCanvasElement, painter: import("./draw.js").Painter, run: any}} side */
   constructor(lab, side) {
-    Object.assign(this, { lab, side });
+    this.lab = lab;
+    this.side = side;
     this.end = -1;   // the last cell of the stroke
     this.fresh = []; // cells that are not applied yet
     this.even = false;

@@ -1,9 +1,10 @@
 /* controls.js: the settings, speeds and brushes beside the world. */
 
-import { PARTS, RULES } from "./engine.js";
+import { LEARNERS, PARTS, RULES } from "./engine.js";
 import { many, seconds } from "./story.js";
 import { WORLDS } from "./worlds.js";
 
+/** @returns {any} an element, or null */
 export const byId = (id) => document.getElementById(id);
 
 const ICONS = {
@@ -25,7 +26,7 @@ const COUNTS = [1, 2, 4, 8, 12, 16, 24, 32, 40, 48, 64, 80, 100, 128, 160, 200, 
                 1500, 2000, 3000, 5000, 10000];
 const percent = (v) => `${Math.round(v * 100)} %`;
 
-/* Sliders: the values of their steps, the words, and whether a change starts the run again. */
+/** Sliders: the values of their steps, the words, and whether a change starts the run again. @type {any[]} */
 const SLIDERS = [
   { name: "ants", label: "Ants", steps: COUNTS, words: many },
   { name: "epsilon", label: "Exploration", steps: Array.from({ length: 51 }, (_, k) => k / 100), words: percent },
@@ -41,6 +42,7 @@ const PART_NAMES = [["directed", "A: scent rises towards food"], ["rightOfWay", 
                     ["seesAnts", "C: ants see each other"]];
 const PLACES = { meadow: "the meadow", plain: "the plain", steppe: "the steppe", bridge: "two bridges", paper: "the paper’s", daily: "today’s map" };
 const CROWDS = { plain: 1000, steppe: 10000, paper: 16 }; // ants to start with
+const LEARNER_NAMES = [["q_learning", "Q-learning"], ["sarsa", "SARSA"], ["frozen", "none: written by hand"]];
 const SIZES = ["small", "medium", "large", "huge"];
 
 /** The index of the step that is nearest to a value. */
@@ -74,28 +76,28 @@ export class Controls {
     const [ants, exploration, ...others] = SLIDERS.filter(({ more }) => !more).map(slider);
     byId("controls").innerHTML = ants + exploration + switched("learns", "Learning") + others.join("") + rules;
     byId("more-controls").innerHTML = SLIDERS.filter(({ more }) => more).map(slider).join("")
+      + `${selected("learner", "Learner", LEARNER_NAMES.map(([learner, words]) => [LEARNERS[learner], words]))}</div>`
       + `${selected("reach", "Brush size", SIZES.map((size, k) => [k, size]))}</div>`
       + `${selected("place", "World", WORLDS.map(({ name }, k) => [k, PLACES[name]]))}</div>`
       + '<div class="control"><label><span>Seed</span><input type="number" id="seed" min="0" max="4294967295" step="1"></label></div>'
       + `${selected("theme", "Colours", [["dark", "dark"], ["light", "light"]])}</div>`;
     for (const each of SLIDERS) this.listen(each);
+    const on = (id, act) => byId(id).addEventListener("change", ({ target }) => act(target));
     byId("learns").addEventListener("click", () => this.lab.set("learns", this.scene.learns ? 0 : 1));
-    byId("rules").addEventListener("change", (event) => this.lab.restart({ rules: RULES[event.target.value] }));
-    byId("parts").addEventListener("change", (event) => this.lab.restart({ rules: this.scene.rules ^ PARTS[event.target.dataset.part] }));
-    byId("reach").addEventListener("change", (event) => { this.lab.ui.reach = Number(event.target.value); });
-    byId("place").addEventListener("change", (event) => {
-      const world = Number(event.target.value);
-      this.lab.restart({ world, ants: CROWDS[WORLDS[world].name] || 64 });
-    });
-    byId("seed").addEventListener("change", (event) => this.lab.restart({ seed: Math.max(0, Math.min(2 ** 32 - 1, Math.floor(event.target.value))) }));
-    byId("theme").addEventListener("change", (event) => this.lab.setTheme(event.target.value));
+    on("rules", ({ value }) => this.lab.restart({ rules: RULES[value] }));
+    on("parts", ({ dataset }) => this.lab.restart({ rules: this.scene.rules ^ PARTS[dataset.part] }));
+    on("learner", ({ value }) => this.lab.restart({ learner: Number(value) }));
+    on("reach", ({ value }) => { this.lab.ui.reach = Number(value); });
+    on("place", ({ value }) => this.lab.restart({ world: Number(value), ants: CROWDS[WORLDS[value].name] || 64 }));
+    on("seed", ({ value }) => this.lab.restart({ seed: Math.max(0, Math.min(2 ** 32 - 1, Math.floor(value))) }));
+    on("theme", ({ value }) => this.lab.setTheme(value));
   }
 
   /** The scene whose settings the controls change: the right one of two. */
   get scene() { return this.lab.runs[this.lab.runs.length - 1].engine.scene; }
 
   listen({ name, steps, words, restarts }) {
-    const input = /** @type {HTMLInputElement} */ (byId(`c-${name}`));
+    const input = byId(`c-${name}`);
     const say = () => this.say(name, words(steps[Number(input.value)]));
     input.addEventListener("input", say);
     input.addEventListener("change", () => {
@@ -106,7 +108,7 @@ export class Controls {
   }
 
   say(name, words) {
-    const input = /** @type {HTMLInputElement} */ (byId(`c-${name}`));
+    const input = byId(`c-${name}`);
     byId(`o-${name}`).textContent = words;
     input.setAttribute("aria-valuetext", words);
     input.style.setProperty("--at", `${100 * Number(input.value) / Number(input.max)}%`);
@@ -116,18 +118,18 @@ export class Controls {
   show() {
     const { scene } = this, ui = this.lab.ui;
     for (const { name, steps, words } of SLIDERS) {
-      /** @type {HTMLInputElement} */ (byId(`c-${name}`)).value = String(stepOf(steps, scene[name]));
+      byId(`c-${name}`).value = String(stepOf(steps, scene[name]));
       this.say(name, words(scene[name]));
     }
     byId("learns").setAttribute("aria-checked", String(Boolean(scene.learns)));
-    const fill = (id, value) => { /** @type {HTMLInputElement} */ (byId(id)).value = String(value); };
+    const fill = (id, value) => { byId(id).value = String(value); };
     const foraging = scene.rules && !(scene.rules & PARTS.queues);
     fill("rules", scene.rules & PARTS.queues ? "queueing" : foraging ? "foraging" : "paper");
     byId("parts").hidden = !foraging;
     for (const box of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("[data-part]"))) {
       box.checked = Boolean(scene.rules & PARTS[box.dataset.part]);
     }
-    for (const [id, value] of [["reach", ui.reach], ["place", scene.world], ["seed", scene.seed], ["theme", ui.theme]]) fill(id, value);
+    for (const [id, value] of [["reach", ui.reach], ["place", scene.world], ["learner", scene.learner], ["seed", scene.seed], ["theme", ui.theme]]) fill(id, value);
   }
 
   /** Buttons of which one is chosen; arrow keys choose the next one. */

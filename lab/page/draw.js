@@ -8,15 +8,32 @@ import { outline } from "./shapes.js";
 
 const DIRECTIONS = 32;          // of the pictures of ants
 const MOST_PIXELS = 2;          // per CSS pixel
-const DOTS = { ants: 4000, scale: 1.9 }; // more ants, or smaller cells: ants are dots
+const DOTS = { ants: 4000, scale: 1.7 }; // more ants, or smaller cells: ants are dots
 const TAU = 2 * Math.PI;
 
 export class Painter {
+  /** @type {import("./run.js").Run} */ run;
+  look = LOOKS.dark;
+  theme = "dark";
+  dpr = 1;             // pixels per CSS pixel
+  s = 1;               // pixels per unit of geometry.js
+  x0 = 0;              // where its origin is
+  y0 = 0;
+  antLength = 1;
+  spriteSide = 1;
+  ramp = new Uint32Array(256);
+  ground = document.createElement("canvas");
+  things = document.createElement("canvas");
+  scent = document.createElement("canvas");  // one pixel a cell
+  bloom = document.createElement("canvas");
+  sprites = document.createElement("canvas");
+  shown = new Float32Array(0);               // levels of scent on their way to the present ones
+  blurred = new Float32Array(0);
+
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
-    [this.ground, this.things, this.scent, this.bloom, this.sprites] = Array.from({ length: 5 }, () => document.createElement("canvas"));
     this.angles = new Float32Array(CAPACITY);
   }
 
@@ -48,7 +65,7 @@ export class Painter {
 
   place(cell) { return this.at(centre(this.run.engine.q(cell), this.run.engine.r(cell))); }
 
-  /** The point of geometry.js under a pointer. */
+  /** The point of geometry.js under a pointer. @returns {[number, number]} */
   under(event) {
     const box = this.canvas.getBoundingClientRect();
     return [((event.clientX - box.left) * this.dpr - this.x0) / this.s, ((event.clientY - box.top) * this.dpr - this.y0) / this.s];

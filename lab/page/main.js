@@ -16,21 +16,24 @@ import { many, storyOf } from "./story.js";
 import { Training } from "./train.js";
 import { SCENE } from "./worlds.js";
 
-/* global COLONY_WASM, ANT_WASM */
+// @ts-ignore: build.py declares it before all modules
+const { COLONY_WASM, ANT_WASM } = BINARIES;
 const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 const MOST_TICKS_MS = 22; // of a frame; ticks that do not fit are dropped
 const WORDS_MS = 100;     // between two changes of words
 
-/** The events of an engine without its last stroke, whose pieces follow each other. */
-function withoutLastStroke({ events, width }) {
-  let first = events.length - 1;
-  while (first >= 0 && !("path" in events[first])) first--;
-  const joins = (piece, next) => piece && piece.path && piece.do === next.do && piece.reach === next.reach
+/** The events of a run without the visitor's last stroke, whose pieces follow each other. */
+function withoutLastStroke({ engine: { events, width }, given }) {
+  const last = events.findLastIndex((event, k) => k >= given && "path" in event);
+  if (last < 0) return events;
+  const joins = (piece, next) => piece.path && piece.do === next.do && piece.reach === next.reach
     && STEPS.some(([q, r]) => piece.path[piece.path.length - 1] + q + r * width === next.path[0]);
-  let from = first;
-  while (from > 0 && joins(events[from - 1], events[from])) from--;
-  return first < 0 ? events : [...events.slice(0, from), ...events.slice(first + 1)];
+  let from = last;
+  while (from > given && joins(events[from - 1], events[from])) from--;
+  return [...events.slice(0, from), ...events.slice(last + 1)];
 }
+
+const hasStroke = ({ engine, given }) => engine.events.some((event, k) => k >= given && "path" in event);
 
 class Lab {
   constructor() {
@@ -39,13 +42,19 @@ class Lab {
     this.ui = { playing: true, speed: 1, brush: "rock", reach: 1, theme: "dark", pointer: null, down: false, focused: false,
                 followed: -1, hero: -1, ghost: null, arrows: "", still: calm.matches, now: 0 };
     calm.addEventListener("change", () => { this.ui.still = calm.matches; });
-    this.sides = [...document.querySelectorAll(".view")].map((view) => {
+    const views = /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".view"));
+    this.sides = [...views].map((view) => {
       const canvas = view.querySelector("canvas");
       return { view, canvas, caption: view.querySelector("figcaption"), painter: new Painter(canvas), run: null };
     });
     this.plot = new Plot(byId("plot"));
     this.frames = []; // [ms at which a frame began, ms of drawing]
-    [this.owed, this.last, this.told, this.wordsAt, this.minds] = [0, 0, "", 0, 0];
+    this.owed = 0;    // ticks that are due
+    this.last = 0;    // ms of the last frame, of the last words, and of the first frame
+    this.wordsAt = 0;
+    this.firstFrame = 0;
+    this.told = "";   // what the story told last
+    this.minds = 0;
     byId("questions").innerHTML = "<h2>What do you expect?</h2>"
       + QUESTIONS.map(({ id, title }) => `<button data-question="${id}">${title}</button>`).join("")
       + '<button data-question="daily">Today’s map: ten rocks</button><button id="train">One ant, alone: learning curves</button>';
@@ -79,6 +88,10 @@ class Lab {
       side.view.hidden = !start;
       side.run = start ? new Run(this.module, start.scene, start.events) : null;
       if (start && start.skip) side.run.skip(start.skip);
+      if (start && question) {
+        side.run.watch();
+        side.run.given = (start.events || []).length;
+      }
       side.caption.hidden = !start || !start.label;
       side.caption.innerHTML = start && start.label || "";
       const what = starts.length > 1 ? `The ${k ? "right" : "left"} world` : "The world";
@@ -87,14 +100,13 @@ class Lab {
     });
     byId("views").classList.toggle("two", starts.length > 1);
     byId("other").hidden = starts.length < 2;
-    byId("unit").innerHTML = starts.length < 2 ? "food per <br>minute" : "right, food <br>per minute";
+    byId("unit").innerHTML = starts.length < 2 ? "food per <br>minute" : "right, per <br>minute";
     Object.assign(this.ui, { followed: -1, hero: -1, ghost: null });
-    byId("undo").disabled = true;
     this.plot.reset();
     [this.told, this.owed, this.fits] = ["", 0, false];
     if (!this.controls) return;
     this.controls.show();
-    for (const button of byId("questions").children) button.setAttribute("aria-current", String(button.dataset.question === (question || {}).id));
+    for (const button of byId("questions").children) button.setAttribute("aria-current", String(Boolean(question) && button.dataset.question === question.id));
   }
 
   /** Ask for a prediction; the runs wait until the visitor has said one. */
@@ -141,7 +153,6 @@ class Lab {
       run.engine.forget();
       run.apply(event);
     }
-    byId("undo").disabled = false;
     this.address.save();
   }
 
@@ -163,19 +174,15 @@ class Lab {
 
   /** Play the runs again without their last stroke, up to now: as if it had never been drawn. */
   undo() {
-    const starts = this.runs.map((run) => ({ run, events: withoutLastStroke(run.engine) }));
-    if (!starts.some(({ run, events }) => events.length < run.engine.events.length)) return;
-    const marks = this.plot.marks, { question } = this, captions = this.sides.map((side) => side.caption.innerHTML);
-    const [moments, begun] = [starts.map(({ run }) => run.tick), starts.map(({ run }) => [run.start, run.earned])];
-    this.begin(starts.map(({ run, events }, k) => ({ scene: run.engine.first, events, label: captions[k] })), question);
+    const old = this.runs, captions = this.sides.map((side) => side.caption.innerHTML);
+    if (!old.some(hasStroke)) return;
+    this.begin(old.map((run, k) => ({ scene: run.engine.first, events: withoutLastStroke(run), label: captions[k] })), this.question);
     this.runs.forEach((run, k) => {
-      run.skip(moments[k]);
-      [run.start, run.earned] = begun[k];
+      run.skip(old[k].tick);
+      Object.assign(run, { start: old[k].start, earned: old[k].earned, given: old[k].given });
     });
-    this.plot.marks = marks.filter(({ word }) => word === "lanes");
-    byId("undo").disabled = !this.runs.some((run) => withoutLastStroke(run.engine).length < run.engine.events.length);
-    this.toast("Played again without your last stroke.");
     this.controls.show();
+    this.toast("Played again without your last stroke.");
     this.address.save();
   }
 
@@ -211,20 +218,8 @@ class Lab {
   }
 
   advance() {
-    for (const run of this.runs) {
-      run.advance();
-      this.note(run);
-    }
+    for (const run of this.runs) run.advance();
     if (this.question) settle(this.question, this.runs);
-  }
-
-  /** Mark in the plot what happened in this tick. */
-  note(run) {
-    if (run !== this.runs[this.runs.length - 1] || this.question) return;
-    const { facts, wall, tick } = run;
-    if (facts.lanes === tick) this.plot.mark(tick, "lanes");
-    if (wall && wall.tick === tick - 1) this.plot.mark(wall.tick, "wall");
-    if (wall && wall.detour === tick) this.plot.mark(tick, "detour");
   }
 
   frame(now) {
@@ -254,6 +249,7 @@ class Lab {
 
   words() {
     const { ui } = this, runs = this.runs, run = runs[runs.length - 1];
+    /** @type {import("./story.js").Story} */
     const told = this.question ? questionStory(this.question, runs) : Daily.is(run) ? this.daily.story(run) : storyOf(run);
     if (told.id !== this.told) {
       this.told = told.id;
@@ -267,12 +263,14 @@ class Lab {
     else ui.ghost = null;
     byId("rate").textContent = many(run.perMinute);
     if (runs.length > 1) byId("rate-left").textContent = many(runs[0].perMinute);
+    byId("undo").disabled = !runs.some(hasStroke);
     byId("tick").textContent = many(run.tick);
     byId("hash").textContent = run.engine.hash();
     this.plot.draw(runs, this.colours);
     if (!byId("mind").hidden && this.minds++ % 3 === 0) byId("table").innerHTML = mindOf(run, ui);
   }
 
+  /** Show a new headline. @param {import("./story.js").Story} told */
   restartAnimation({ head, options, ghost }) {
     const story = byId("headline").closest(".story");
     story.classList.remove("new");

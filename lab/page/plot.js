@@ -9,15 +9,10 @@ export class Plot {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
-    this.reset();
+    this.most = 120; // of the axis, loads per minute
   }
 
-  reset() { [this.marks, this.most] = [[], 120]; }
-
-  /** Mark a tick with a word; the same word at the same tick is marked once. */
-  mark(tick, word) {
-    if (!this.marks.some((mark) => mark.tick === tick && mark.word === word)) this.marks.push({ tick, word });
-  }
+  reset() { this.most = 120; }
 
   /** @param {import("./run.js").Run[]} runs one or two  @param {Record<string, string>} colours */
   draw(runs, colours) {
@@ -54,7 +49,7 @@ export class Plot {
         x.fill();
       });
     }
-    this.drawMarks(x, w, bottom, from, px, colours);
+    if (runs.length === 1) this.drawMarks(x, w, runs[0].marks.filter(({ tick }) => tick >= from), bottom, px, colours);
   }
 
   drawAxes(x, w, h, py, from, span, colours) {
@@ -97,12 +92,11 @@ export class Plot {
   yOf(value, bottom) { return bottom - value / this.most * (bottom - TOP); }
 
   /** Words in two rows; a mark that finds no room keeps its line only. */
-  drawMarks(x, w, bottom, from, px, colours) {
+  drawMarks(x, w, marks, bottom, px, colours) {
     const free = [-99, -99];
     x.textAlign = "left";
     [x.strokeStyle, x.fillStyle] = [colours.text, colours.text];
-    for (const { tick, word } of this.marks) {
-      if (tick < from) continue;
+    for (const { tick, word } of marks) {
       const at = Math.round(px(tick)) + 0.5, wide = x.measureText(word).width, left = Math.min(at, w - wide - 1);
       x.globalAlpha = 0.5;
       x.setLineDash([2, 3]);

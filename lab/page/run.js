@@ -16,7 +16,7 @@ const MOST_SPARKS = 80;
 const PICKED_UP = EVENTS.pickedUp, DELIVERED = EVENTS.delivered;
 
 export class Run {
-  /** @param {object} scene see SCENE in worlds.js  @param {object[]} events a replay, see engine.js */
+  /** @param {WebAssembly.Module} module  @param {import("./worlds.js").Scene} scene  @param {any[]} events a replay, see engine.js */
   constructor(module, scene, events = []) {
     const e = this.engine = new Engine(module, scene, events);
     this.scene = e.scene;
@@ -28,7 +28,10 @@ export class Run {
     this.visits = new Int32Array(e.values.length / 8); // how often an ant was in a state
     this.sparks = [];                                  // pick-ups and deliveries, which the drawing shows for a moment
     this.seen = 0;                                     // events that are noted
-    [this.start, this.earned] = [0, 0];                // the tick at which somebody began to watch, and the returns then
+    this.marks = [];                                   // ticks with a word, for the plot
+    this.given = 0;                                    // events at the start that are part of a question
+    this.start = 0;                                    // the tick at which somebody began to watch
+    this.earned = 0;                                   // the returns then
   }
 
   get tick() { return this.engine.tick; }
@@ -57,16 +60,25 @@ export class Run {
     this.noteAnts();
     const { facts, wall, tick } = this;
     this.total.push(this.engine.deliveries);
-    if (facts.lanes < 0 && tick >= LANES.ticks && this.sum(LANES.ticks) >= LANES.loads) facts.lanes = tick;
+    if (facts.lanes < 0 && tick >= LANES.ticks && this.sum(LANES.ticks) >= LANES.loads) {
+      facts.lanes = tick;
+      this.mark("lanes");
+    }
     if (wall && wall.crossed && wall.detour < 0 && tick - wall.last >= STOPPED) wall.stopped = true;
   }
 
-  /** Pass ticks that nobody watches, up to a tick. */
+  /** Pass ticks at once, up to a tick. */
   skip(tick) {
     while (this.tick < tick) this.advance();
     this.sparks = [];
-    [this.start, this.earned] = [this.tick, this.engine.returns];
   }
+
+  /** Begin to watch now: plots and questions count from here. */
+  watch() {
+    [this.start, this.earned, this.marks] = [this.tick, this.engine.returns, []];
+  }
+
+  mark(word) { this.marks.push({ tick: this.tick, word }); }
 
   noteAnts() {
     const e = this.engine, { facts, tick } = this;
@@ -108,6 +120,7 @@ export class Run {
     else {
       this.wall = { tick: event.tick, last: event.tick, traffic: 0, came: 0, detour: -1, stopped: false, crossed: false,
                     compares: true, rate: this.sum(WINDOW), number: old ? old.number + 1 : 1 };
+      this.mark("wall");
     }
     this.wall.traffic += crossed;
     this.wall.crossed = this.wall.traffic >= BLOCKS;
@@ -115,7 +128,9 @@ export class Run {
 
   /** A load that was picked up after the wall was finished is home. */
   noteDetour() {
-    if (++this.wall.came === DETOUR && this.wall.crossed) this.wall.detour = this.tick;
+    if (++this.wall.came !== DETOUR || !this.wall.crossed) return;
+    this.wall.detour = this.tick;
+    this.mark("detour");
   }
 
   noteGift(event) {

@@ -40,8 +40,9 @@ const more = (a, b) => `${(b ? a / b : a).toFixed(1)} times as much`;
 export const QUESTIONS = [
   {
     id: "never", title: "The ant that never delivers", ticks: 700, speed: 4,
-    ask: "Who brings more food home?", options: ["The better paid ant", "The other one"],
-    sub: "Each ant learned alone for 20 000 ticks. Food at home pays 10 points. Each step on its way pays the left ant 1 point, the right one 10.",
+    ask: "Who brings home more?", options: ["The better paid ant", "The other one"],
+    sub: "Each ant learned alone for 20 000 ticks. Food at home pays 10 points. A step along scent, or with food nearer to the nest, "
+      + "pays the left ant 1 point and the right one 10.",
     sides: [{ label: "1 point for a step", scene: NEVER, events: stop(20000), skip: 20000 },
             { label: "10 points for a step", scene: { ...NEVER, shaping: 10 }, events: stop(20000), skip: 20000 }],
     answer: ([left, right]) => ({

@@ -10,8 +10,10 @@ function corner(q, r, k) {
 }
 
 /* Corners of three cells are computed three times and differ in their last bits; keys are equal. */
+/** @param {number[]} point */
 const keyOf = ([x, y]) => Math.round(x * 2) * 65536 + Math.round(y * 4 / ROOT3);
 
+/** @param {number[]} from  @param {number[]} to */
 const mixed = ([x, y], [a, b], t) => [x + (a - x) * t, y + (b - y) * t];
 
 /** The rings of corners around cells, in the unit of geometry.js. */
@@ -52,7 +54,10 @@ function smoothed(ring) {
 export function outline(engine, cells, has, place) {
   const path = new Path2D();
   for (const ring of ringsOf(engine, cells, has)) {
-    smoothed(ring).forEach((point, k) => path[k ? "lineTo" : "moveTo"](...place(point)));
+    smoothed(ring).forEach((point, k) => {
+      const [x, y] = place(point);
+      path[k ? "lineTo" : "moveTo"](x, y);
+    });
     path.closePath();
   }
   return path;

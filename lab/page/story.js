@@ -14,7 +14,8 @@ export function seconds(ticks) {
 
 /**
  * What to tell about a run. `id` changes whenever something has happened.
- * @returns {{id: string, head: string, sub: string, call?: string, ghost?: boolean, options?: string[]}}
+ * @typedef {{id: string, head: string, sub: string, call?: string, ghost?: boolean, options?: string[]}} Story
+ * @returns {Story}
  */
 export function storyOf(run) {
   const { facts, wall, gift } = run;

@@ -50,8 +50,9 @@ function curveOf(returns, seeds) {
 export class Training {
   /** @param {any} lab  @param {Uint8Array} bytes ant.wasm */
   constructor(lab, bytes) {
-    Object.assign(this, { lab, bytes });
-    this.dialog = /** @type {HTMLDialogElement} */ (byId("training"));
+    this.lab = lab;
+    this.bytes = bytes;
+    this.dialog = byId("training");
     this.curves = [];
     byId("train").addEventListener("click", () => this.open());
     this.dialog.addEventListener("click", ({ target }) => { if (target === this.dialog) this.dialog.close(); });
@@ -110,7 +111,7 @@ export class Training {
   }
 
   chosen() {
-    const wanted = Object.fromEntries(CHOICES.map(([name]) => [name, /** @type {HTMLSelectElement} */ (byId(`t-${name}`)).value]));
+    const wanted = Object.fromEntries(CHOICES.map(([name]) => [name, byId(`t-${name}`).value]));
     return GRID.find((setting) => CHOICES.every(([name]) => wordingOf(name, setting) === wanted[name]));
   }
 
@@ -128,7 +129,7 @@ export class Training {
 
   /** The paper's 128 settings with 100 seeds each: a dot for the IQM of each, and the best five. */
   async grid() {
-    const bar = /** @type {HTMLProgressElement} */ (byId("t-bar")), began = performance.now(), rows = [];
+    const bar = byId("t-bar"), began = performance.now(), rows = [];
     bar.hidden = false;
     await this.train(GRID, ({ returns, deliveries }, setting) => {
       const [points, home] = [lastOf(returns, SEEDS), lastOf(deliveries, SEEDS)];
@@ -147,7 +148,7 @@ export class Training {
 
   /** A clean canvas, its size in CSS pixels, and colours. */
   surface() {
-    const canvas = /** @type {HTMLCanvasElement} */ (byId("t-plot")), dpr = Math.min(2, devicePixelRatio || 1), [w, h] = [canvas.clientWidth, canvas.clientHeight];
+    const canvas = byId("t-plot"), dpr = Math.min(2, devicePixelRatio || 1), [w, h] = [canvas.clientWidth, canvas.clientHeight];
     [canvas.width, canvas.height] = [w * dpr, h * dpr];
     const x = canvas.getContext("2d");
     x.scale(dpr, dpr);

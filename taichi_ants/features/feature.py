@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,6 +26,7 @@ ANT, NEST, CASTE = "ant", "nest", "caste"
 Task = Any
 Caste = Any
 State = Any  # a `ColonyState`
+_default: Any = cache(lambda settings: settings())  # of a group; they cost more than the rest
 
 
 class Array(NamedTuple):
@@ -140,7 +141,7 @@ class Feature:
     hooks: dict[str, KernelFunction] = field(default_factory=dict)
     inputs: dict[str, tuple[Input, KernelFunction]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def group(self) -> str:
         """The name of its group of settings in a task."""
         return self.settings.path.split(".")[1]
@@ -154,18 +155,14 @@ class Feature:
         """Return its settings in a task."""
         return getattr(task, self.group)
 
-    @cached_property
-    def _unused(self) -> Settings:
-        """The default settings, which mean that a task does not use the feature."""
-        return self.settings()
-
     def is_used(self, task: Task) -> bool:
         """Whether a task uses the feature."""
         if self.uses is not None:
             return self.uses(task)
+        chosen, default = self.of(task), _default(self.settings)
         if self.switch:
-            return getattr(self.of(task), self.switch) != getattr(self._unused, self.switch)
-        return self.of(task) != self._unused
+            return getattr(chosen, self.switch) != getattr(default, self.switch)
+        return chosen != default
 
     def at(self, point: str) -> Callable[[Function], KernelFunction]:
         """Register a function as the hook at a point, as a decorator."""

@@ -159,6 +159,15 @@ class AxialGrid:
         high -= np.minimum(np.minimum(q, r), np.int32(0))
         return high.reshape(-1)
 
+    def closer_to(self, cell: tuple[int, int, int]) -> np.ndarray:
+        """Return bit h by index, 1 if the neighbour at heading h is nearer to `cell` (uint8)."""
+        distances = self.distances(cell).astype(np.uint8)  # modulo 256, as neighbours differ by 1
+        bits = np.zeros(self.size, dtype=np.uint8)
+        for heading, offset in enumerate(self.offsets.tolist()):
+            is_closer = distances - np.roll(distances, -offset) == 1
+            bits |= is_closer.astype(np.uint8) << np.uint8(heading)
+        return bits * self.exists
+
     def number(self, index: np.ndarray) -> np.ndarray:
         """Return the ranks, int32 (...), of flat indices (...) in lexicographic order of cells."""
         _, y_range, z_range = self.ranges

@@ -99,7 +99,7 @@ class ReferenceColony:
     @property
     def castes(self) -> list[Caste]:
         """The castes of the task, or one without settings."""
-        return list(self.task.castes.values()) or [Caste()]
+        return list(self.task.castes.values()) or [castes.ONE]
 
     def table_of(self, ant: Ant | Transition) -> int:
         """Return the number of the table of an ant."""

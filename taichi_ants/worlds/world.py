@@ -166,12 +166,7 @@ class World:
 
     def closer(self, nest: int = 0) -> np.ndarray:
         """Return bit h by cell, 1 if the neighbour at heading h is nearer to a queen (uint8)."""
-        distances = self._far(nest).astype(np.uint8)  # modulo 256, because neighbours differ by 1
-        bits = np.zeros(self.grid.size, dtype=np.uint8)
-        for heading, offset in enumerate(self.grid.offsets.tolist()):
-            is_closer = distances - np.roll(distances, -offset) == 1
-            bits |= is_closer.astype(np.uint8) << np.uint8(heading)
-        return bits * self.grid.exists
+        return self.grid.closer_to(tuple(self.queens[nest].tolist()))
 
     def walkable(self, starts: np.ndarray) -> np.ndarray:
         """Return the empty cells within reach of empty cells in `starts`, bool (grid.size,)."""
