@@ -389,8 +389,8 @@ MUTATIONS = [
     ("studies/design.py", "default_rng(RANDOM_SEED)", "default_rng(0)", DESIGN),
     # Archives of studies, and descriptions of models.
     ("commands/reproduce.py", "> MOST_BYTES:", "> 2 * MOST_BYTES:", ARCHIVE),
-    ("commands/reproduce.py", "sum(map(bool, diff", "0 * sum(map(bool, diff", ARCHIVE),
-    ("commands/reproduce.py", "if not settings.trust_code:", "if False:", ARCHIVE),
+    ("commands/reproduce.py", "len(names) - len(equal):", "0:", ARCHIVE),
+    ("commands/reproduce.py", "if code and not settings.trust_code:", "if False:", ARCHIVE),
     ("files/__init__.py", "return copy or path", "return path", ARCHIVE),
     ("report/odd.py", 'return row.get(f"{group}.{other}") in needed', "return True", ODD),
     ("report/odd.py", "value[n] if name in varies", "value[0] if name in varies", ODD),
