@@ -386,7 +386,7 @@ MUTATIONS = [
     ("studies/design.py", "margin = 0.5 if axis.whole else 0.0", "margin = 0.0", DESIGN),
     ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
     ("studies/design.py", "from_last[-1] = True", "from_last[-1] = False", DESIGN),
-    ("studies/design.py", "default_rng(RANDOM_SEED)", "default_rng(0)", DESIGN),
+    ("analysis/sensitivity.py", "default_rng(RANDOM_SEED)", "default_rng(0)", DESIGN),
     # Archives of studies, and descriptions of models.
     ("commands/reproduce.py", "> MOST_BYTES:", "> 2 * MOST_BYTES:", ARCHIVE),
     ("commands/reproduce.py", "len(names) - len(equal):", "0:", ARCHIVE),
