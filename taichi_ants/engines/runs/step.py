@@ -5,6 +5,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import taichi as ti
+from taichi.lang.impl import subscript
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import draw_below
@@ -73,6 +74,33 @@ def ant_view(a: Any, ant: Any) -> Named:
     Other names are those of the arrays and numbers of kernels.
     """
     return Named(lambda name: getattr(ant if name in Ant.members else a, name))
+
+
+class Part:
+    """A part of an array, from index `first` on, while a kernel compiles."""
+
+    def __init__(self, array: Any, first: Any) -> None:
+        self.array, self.first = array, first
+
+    def __getitem__(self, index: Any) -> Any:
+        return subscript(None, self.array, self.first + index)
+
+
+@while_compiling
+def parts_of(a: Any, numbers: tuple[str, ...]) -> Named:
+    """Return the arguments of a kernel, and the arrays that `layout.join` has joined, by name.
+
+    The array `numbers` has the arguments of these names.
+    """
+
+    def read(name: str) -> Any:
+        if name in numbers:
+            return subscript(None, a.numbers, numbers.index(name))
+        if hasattr(a, name):
+            return getattr(a, name)
+        return Part(a.memory, read(f"{name}_at"))
+
+    return Named(read)
 
 
 @ti.func
