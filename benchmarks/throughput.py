@@ -74,7 +74,7 @@ class CJob(ctypes.Structure):
             for name in ("n", "learner", "planning_steps", "delivery_truncates")
         ),
         *((name, ctypes.c_int32) for name in ("episodes", "max_steps", "threads")),
-        *((name, ctypes.c_void_p) for name in ("q", "returns", "steps")),
+        *((name, ctypes.c_void_p) for name in ("q", "returns", "steps", "deliveries")),
     )
 
 

@@ -11,6 +11,9 @@
 #include <string.h>
 
 #include "ant.h"
+#ifdef __wasm_simd128__
+#include <wasm_simd128.h>
+#endif
 
 enum { TOGETHER = 4, N_PAIRS = N_STATES * N_ACTIONS, ROW = 8 };
 /* A cell has its level + 1 above four bits if it is empty, else its ground in these bits. */
@@ -151,20 +154,38 @@ INLINE void act(const Shared *shared, Ant *ant)
         ant->cells[cell] = LEVEL(DEPOSIT);
 }
 
+#ifdef __wasm_simd128__ /* where a selection between floats is slow */
+INLINE float best_of(const float *v)
+{
+    v128_t best = wasm_f32x4_pmax(wasm_v128_load(v), wasm_v128_load(v + 1));
+    best = wasm_f32x4_pmax(best, wasm_i32x4_shuffle(best, best, 2, 3, 0, 1));
+    best = wasm_f32x4_pmax(best, wasm_i32x4_shuffle(best, best, 1, 0, 3, 2));
+    return wasm_f32x4_extract_lane(best, 0);
+}
+INLINE unsigned set_of(const float *v, float best)
+{
+    unsigned first = wasm_i32x4_bitmask(wasm_f32x4_eq(wasm_v128_load(v), wasm_f32x4_splat(best)));
+    return first | (unsigned)(v[GIVE] == best) << GIVE;
+}
+#else
 INLINE float larger(float a, float b) { return a > b ? a : b; }
 INLINE float best_of(const float *v)
 {
     return larger(larger(larger(v[0], v[1]), larger(v[2], v[3])), v[4]);
 }
+INLINE unsigned set_of(const float *v, float best)
+{
+    unsigned set = 0;
+    for (int action = 0; action < N_ACTIONS; action++)
+        set |= (unsigned)(v[action] >= best) << action;
+    return set;
+}
+#endif
 
 INLINE void note_best(const Shared *shared, Row *row)
 {
-    float best = best_of(row->values);
-    int set = 0;
-    for (int action = 0; action < N_ACTIONS; action++)
-        set |= (row->values[action] >= best) << action;
-    row->best = best;
-    row->choices = shared->choices[set];
+    row->best = best_of(row->values);
+    row->choices = shared->choices[set_of(row->values, row->best)];
 }
 
 INLINE int choose(const Row *row, Ant *ant)
@@ -278,6 +299,8 @@ static inline int end_episode(Shared *shared, Ant *ant, int learner)
     size_t at = (size_t)ant->number * (size_t)job->episodes + (size_t)ant->episode++;
     job->returns[at] = ant->sum;
     job->steps[at] = ant->step;
+    if (job->deliveries)
+        job->deliveries[at] = ant->delivered;
     double epsilon = ant->run.epsilon * ant->run.decay;
     ant->run.epsilon = epsilon > ant->run.min_epsilon ? epsilon : ant->run.min_epsilon;
     if (ant->episode < job->episodes) {

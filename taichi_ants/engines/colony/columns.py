@@ -6,9 +6,10 @@ from typing import Any
 import taichi as ti
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, high_word, stream_of
+from taichi_ants.engines.colony.layout import Order
 from taichi_ants.grid.constants import STREAM_INDIVIDUAL
 
-_TEMPLATES = {"c", "v", "column", "cues", "field", "view", "row", "phase"}
+_TEMPLATES = {"c", "v", "column", "cues", "field", "view", "row", "phase", "update"}
 
 
 def function(body: Callable[..., Any]) -> Callable[..., Any]:
@@ -20,6 +21,24 @@ def function(body: Callable[..., Any]) -> Callable[..., Any]:
     arguments = body.__code__.co_varnames[: body.__code__.co_argcount]
     body.__annotations__ |= {name: ti.template() for name in arguments if name in _TEMPLATES}
     return ti.func(body)
+
+
+@function
+def chunks_of(c, v):
+    """Return the number of chunks of each world in a launch."""
+    n = 1
+    if ti.static(v.in_chunks):
+        n = c.orders[Order.CHUNKS]
+    return n
+
+
+@function
+def share_of(c, v, chunk, n):
+    """Return the range of a chunk among n ants, cells or states of a world."""
+    n_chunks = chunks_of(c, v)
+    each = (n + n_chunks - 1) // n_chunks
+    first = chunk % n_chunks * each
+    return first, ti.min(first + each, n)
 
 
 @function
@@ -48,6 +67,12 @@ def nest_of(c, v, ant):
     if ti.static(v.n_nests > 1):
         nest = trait(c.nest, ant)
     return nest
+
+
+@function
+def own_map(c, v, w, ant):
+    """Return the place of an ant's cell in an array with a map for each nest."""
+    return (w * v.n_nests + nest_of(c, v, ant)) * c.size + c.cell[ant]
 
 
 @function

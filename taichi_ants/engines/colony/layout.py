@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import fields
 from enum import IntEnum, auto
@@ -12,6 +13,7 @@ from taichi_ants.features import arrays
 from taichi_ants.features.castes import CASTES
 from taichi_ants.features.feature import ANT, Array
 from taichi_ants.features.foods import Food
+from taichi_ants.runtime import MAX_THREADS
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
 from taichi_ants.task.model import Model
 
@@ -118,25 +120,32 @@ TALLY_WIDTH = 16
 
 
 class Order(IntEnum):
-    """Indices of `orders`, the parameters of a launch of `kernels.ticks`."""
+    """Indices of `orders`, the parameters of a launch whose work is divided into parts."""
 
     TICKS = 0  # the number of ticks
     PARTS = auto()  # the number of parts of the work
+    CHUNKS = auto()  # the number of chunks of each world, of which each part does its share
     THREADS = auto()  # the number of threads among which independent worlds are dealt, see `ticks`
     FIRST = auto()  # the first group of phases that is not done yet
     SPINS = auto()  # the number of checks for the other parts before the first part gives up
     PASSED = auto()  # not a parameter: the ticks since `ColonyState.ticks` was 0, which it counts
 
 
+LINE = 16  # numbers in `barrier` that fill two cache lines, which processors fetch together
+ARRIVALS_TOGETHER = 8  # the number of parts that count their arrivals in one line
+
+
 class Barrier(IntEnum):
-    """Indices of `barrier`, each in its own cache line."""
+    """Indices of `barrier`, see there."""
 
     STARTED = 0  # the number of parts that have started
-    ARRIVED = 8  # the number of arrivals at barriers, without those of the first part
-    OPENED = 16  # the number of opened barriers; negative if the first part has given up
+    OPENED = LINE  # the number of opened barriers; negative if the first part has given up
+    ARRIVED = 2 * LINE  # the number of times that all of some parts have arrived
+    TOGETHER = 3 * LINE  # the arrivals of some parts, and of the next ones LINE further, and so on
 
 
 GAVE_UP = -(2**40)  # added to OPENED when the first part gives up, which keeps the number
+BARRIER_SIZE = Barrier.TOGETHER + LINE * (1 + MAX_THREADS // ARRIVALS_TOGETHER)
 
 
 def _rows(names: Iterable[str]) -> Any:
@@ -161,7 +170,7 @@ class FoodSourceRow(IntEnum):
 
 
 class SumRow(IntEnum):
-    """Rows of `sums_of`: the updates of a state-action pair in a tick, a column for each chunk."""
+    """Rows of `sums_of`: the updates of a state-action pair in a tick, see `learning`."""
 
     COUNT = 0
     LATEST = auto()  # the highest ant number
@@ -175,7 +184,10 @@ ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food
 
 # The number of slots from which threads share a world: a single world, and each of many.
 _LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
-_CHUNKS_PER_THREAD = 2
+SORTED_BITS = 16  # of the number of a cell, by which ants are sorted
+TOUCHED_LINE = 32  # numbers that fill two cache lines, see `LINE`
+# The most sums of TD errors of all chunks, if the tables are large: 28 bytes each.
+_MOST_SUMS = 2**22
 
 
 def array_of(number: int, dense: bool) -> str:
@@ -183,9 +195,19 @@ def array_of(number: int, dense: bool) -> str:
     return f"field_{number}" if number else "level" if dense else "trail"
 
 
-def schedule_of(given: str | None, n_worlds: int, capacity: int, threads: int) -> tuple[str, int]:
-    """Return a schedule, by default the faster one, and the number of chunks of ants in a world."""
+def schedule_of(given: str | None, n_worlds: int, capacity: int) -> str:
+    """Return a schedule, by default the faster one."""
     large = capacity >= (_LARGE_ALONE if n_worlds == 1 else _LARGE_COLONY)
     schedule = ("by_chunk" if large else "by_world") if given is None else given
     check_one_of("schedule", schedule, ("by_world", "by_chunk"))
-    return schedule, _CHUNKS_PER_THREAD * threads if schedule == "by_chunk" else 1
+    return schedule
+
+
+def most_chunks(n_worlds: int, capacity: int, pairs: int, threads: int) -> int:
+    """Return the most chunks of a world, if each has sums for some pairs of state and action."""
+    return max(1, min(threads, capacity, _MOST_SUMS // max(1, n_worlds * pairs)))
+
+
+def chunks_for(parts: int, n_worlds: int, most: int) -> int:
+    """Return the fewest chunks of a world that give all parts equal shares, if that is allowed."""
+    return min(parts // math.gcd(parts, n_worlds), most)

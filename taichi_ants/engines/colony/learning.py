@@ -3,20 +3,24 @@
 With a shared table, all ants choose and compute their TD errors by the table at the start of the
 tick. The n errors of a pair are summed as 64-bit fixed-point numbers, so that their order does not
 matter. The value moves by weights[n] times their mean, as n successive updates towards one target
-would move it. Each chunk of ants has its own sums, without atomic operations.
+would move it.
+
+Each chunk of ants has its own sums, without atomic operations. If a world is one chunk, `touched`
+lists the pairs with updates: their number, then the pairs. Else `touched` marks the states with
+updates, and chunks share the states: each joins the sums of its states into those of the world,
+which come before those of chunks, and applies them.
 """
 
 import taichi as ti
 
 from taichi_ants.arithmetic.random_bits import advance, draw_below
 from taichi_ants.engines.colony import columns, steps
-from taichi_ants.engines.colony.columns import function
-from taichi_ants.engines.colony.layout import CasteRow, Stage, SumRow, Tally
+from taichi_ants.engines.colony.columns import chunks_of, function
+from taichi_ants.engines.colony.layout import TOUCHED_LINE, CasteRow, Stage, SumRow, Tally
 from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.learners import model
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
-from taichi_ants.task.constants import BEST_AT, N_ACTIONS, ROW
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import BEST_AT, N_ACTIONS, ROW, Event
 from taichi_ants.task.rules.actions import step_end, terminates
 from taichi_ants.task.rules.policy import best_actions
 
@@ -249,10 +253,10 @@ def share_error(c, v, w, chunk, ant, seen, next_action):
     pair = steps.state_index_of(c, v, ant) * ROW + columns.trait(c.action, ant)
     pair += columns.group_of(c, v, ant) * v.n_numbers
     error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
-    add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
+    entry = add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
     if ti.static(v.learner.plans):
         transition = model.pack_transition(seen, reward, terminated)
-        note_transition(c, v.n_pairs * chunk + pair, c.number[ant], transition)
+        note_transition(c, entry, c.number[ant], transition)
 
 
 @ti.func
@@ -262,27 +266,43 @@ def fixed(error):
 
 
 @function
-def list_of(v, chunk):
-    """Return the start of a chunk's list in `touched`: the number of pairs, then the pairs."""
-    return (v.n_pairs + 1) * chunk
+def touched_of(v, sums):
+    """Return the start of what `touched` holds of the sums of a chunk or world."""
+    size = ti.static(TOUCHED_LINE * -(-v.n_rows // TOUCHED_LINE) if v.in_chunks else v.n_pairs + 1)
+    return size * sums
+
+
+@function
+def sums_of_chunk(c, v, chunk):
+    """Return the number of a chunk's sums: those of worlds come first, if worlds have chunks."""
+    return c.n_worlds + chunk if ti.static(v.in_chunks) else chunk
 
 
 @function
 def add_to_sums(c, v, chunk, pair, error, total, count):
-    """Add `count` updates of a pair to a chunk's sums, the last of them with this error."""
-    entry, listed = v.n_pairs * chunk + pair, list_of(v, chunk)
-    known, n = c.sums_of[SumRow.COUNT, entry], c.touched[listed]
-    summed = c.sums[entry]
-    # Without a branch: a new pair stays in the list, others leave their place to the next one.
-    # There is room, because a table has pairs that do not exist, see `ROW`.
-    c.touched[listed + 1 + n] = pair
-    c.touched[listed] = n + ti.cast(known == 0, ti.i32)
+    """Add `count` updates of a pair to a chunk's sums, the last of them with this error.
+
+    Returns:
+        The index of the pair's sums.
+    """
+    sums = sums_of_chunk(c, v, chunk)
+    entry, touched = v.n_pairs * sums + pair, touched_of(v, sums)
+    known, summed = c.sums_of[SumRow.COUNT, entry], c.sums[entry]
+    if ti.static(v.in_chunks):
+        c.touched[touched + pair // ROW] = 1
+    else:
+        # Without a branch: a new pair stays in the list, others leave their place to the next one.
+        # There is room, because a table has pairs that do not exist, see `ROW`.
+        n = c.touched[touched]
+        c.touched[touched + 1 + n] = pair
+        c.touched[touched] = n + ti.cast(known == 0, ti.i32)
     if ti.static(v.learner.plans):
         if known == 0:
             c.sums_of[SumRow.LATEST, entry] = -1
     c.sums_of[SumRow.COUNT, entry] = known + count
     c.sums[entry] = summed + total
     c.errors[entry] = error
+    return entry
 
 
 @function
@@ -294,74 +314,104 @@ def note_transition(c, entry, number, transition):
 
 
 @function
-def learn_together(c, v, w, tick):
-    """Update the table of a world by the errors of all its ants."""
-    join_sums(c, v, w)
-    if ti.static(v.learner.plans):
-        remember_shared(c, v, w)
-    apply_sums(c, v, w)
+def join_sums(c, v, w, first, last):
+    """Join the sums of all chunks of a world in a range of states, and reset them."""
+    if ti.static(v.in_chunks):
+        for row in range(first, last):
+            found, n_chunks = 0, chunks_of(c, v)
+            for sums in range(c.n_worlds + w * n_chunks, c.n_worlds + (w + 1) * n_chunks):
+                if c.touched[touched_of(v, sums) + row] == 1:
+                    c.touched[touched_of(v, sums) + row] = 0
+                    for pair in range(row * ROW, row * ROW + N_ACTIONS):
+                        join_pair(c, v, v.n_pairs * sums + pair, v.n_pairs * w + pair, found)
+                    found = 1
+            c.touched[touched_of(v, w) + row] = found
 
 
 @function
-def join_sums(c, v, w):
-    """Add the sums of all chunks of a world to those of the first chunk."""
-    first = w * c.n_chunks
-    for chunk in range(first + 1, first + c.n_chunks):
-        listed = list_of(v, chunk)
-        for i in range(c.touched[listed]):
-            pair = c.touched[listed + 1 + i]
-            entry = v.n_pairs * chunk + pair
-            count = c.sums_of[SumRow.COUNT, entry]
-            add_to_sums(c, v, first, pair, c.errors[entry], c.sums[entry], count)
-            if ti.static(v.learner.plans):
-                latest, transition = (
-                    c.sums_of[SumRow.LATEST, entry],
-                    c.sums_of[SumRow.TRANSITION, entry],
-                )
-                note_transition(c, v.n_pairs * first + pair, latest, transition)
-            c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
-        c.touched[listed] = 0
+def join_pair(c, v, entry, joined, found):
+    """Add the sums of a pair to the joined ones, if any were `found`, and reset them."""
+    count, before, total = c.sums_of[SumRow.COUNT, entry], 0, c.sums[entry]
+    if found == 1:
+        before, total = c.sums_of[SumRow.COUNT, joined], total + c.sums[joined]
+    c.sums_of[SumRow.COUNT, joined], c.sums[joined] = before + count, total
+    if count > 0:
+        c.errors[joined] = c.errors[entry]
+        if ti.static(v.learner.plans):
+            if before == 0:
+                c.sums_of[SumRow.LATEST, joined] = -1
+            latest, transition = (
+                c.sums_of[SumRow.LATEST, entry],
+                c.sums_of[SumRow.TRANSITION, entry],
+            )
+            note_transition(c, joined, latest, transition)
+        c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
 
 
 @function
-def remember_shared(c, v, w):
+def each_updated(c, v, w, first, last, update):
+    """Call update(c, v, w, pair, entry) for the pairs with joined sums in a range of states."""
+    if ti.static(v.in_chunks):
+        for row in range(first, last):
+            if c.touched[touched_of(v, w) + row] == 1:
+                for pair in range(row * ROW, row * ROW + N_ACTIONS):
+                    if c.sums_of[SumRow.COUNT, v.n_pairs * w + pair] > 0:
+                        update(c, v, w, pair, v.n_pairs * w + pair)
+    else:
+        touched = touched_of(v, w)
+        for i in range(touched + 1, touched + 1 + c.touched[touched]):
+            update(c, v, w, c.touched[i], v.n_pairs * w + c.touched[i])
+
+
+@function
+def remember_shared(c, v, w, tick):
     """Store the joined transitions in the shared model, new pairs in ascending order."""
-    memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
-    chunk = w * c.n_chunks
-    listed = list_of(v, chunk)
-    n = c.touched[listed]
-    for i in range(2, n + 1):  # insertion sort, because lists are short
+    if ti.static(not v.in_chunks):
+        sort_touched(c, v, w)
+    each_updated(c, v, w, 0, v.n_rows, remember_pair)
+
+
+@function
+def sort_touched(c, v, w):
+    """Sort the list of a world, by insertion because lists are short."""
+    listed = touched_of(v, w)
+    for i in range(2, c.touched[listed] + 1):
         pair = c.touched[listed + i]
         j = i - 1
         while j >= 1 and c.touched[listed + ti.max(j, 1)] > pair:
             c.touched[listed + j + 1] = c.touched[listed + j]
             j -= 1
         c.touched[listed + j + 1] = pair
-    for i in range(1, n + 1):
-        pair = c.touched[listed + i]
-        transition = c.sums_of[SumRow.TRANSITION, v.n_pairs * chunk + pair]
-        group = group_of_pair(v, pair)
-        at = memory_of(c, v, w * v.n_groups + group)
-        model.remember(memory, at, pair - group * v.n_numbers, transition)
 
 
 @function
-def apply_sums(c, v, w):
-    """Update the shared values of a world by the joined sums, and reset the sums."""
-    chunk = w * c.n_chunks
-    listed = list_of(v, chunk)
-    for i in range(c.touched[listed]):
-        pair = c.touched[listed + 1 + i]
-        entry = v.n_pairs * chunk + pair
-        count = c.sums_of[SumRow.COUNT, entry]
-        error, value = c.errors[entry], place_in_tables(c, v, w, pair)
-        rate = weight_of(c, v, pair, count)
-        mean = ti.cast(c.sums[entry], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
-        error = ti.select(count > 1, ti.cast(mean, ti.f32), error)
-        c.q[value] = c.q[value] + rate * error
-        note_best_actions(c, value)
-        c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
-    c.touched[listed] = 0
+def remember_pair(c, v, w, pair, entry):
+    """Store the joined transition of a pair in the shared model."""
+    memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
+    transition, group = c.sums_of[SumRow.TRANSITION, entry], group_of_pair(v, pair)
+    at = memory_of(c, v, w * v.n_groups + group)
+    model.remember(memory, at, pair - group * v.n_numbers, transition)
+
+
+@function
+def apply_sums(c, v, w, first, last):
+    """Update the shared values of a world by the joined sums of a range of states."""
+    each_updated(c, v, w, first, last, apply_pair)
+    if ti.static(not v.in_chunks):
+        c.touched[touched_of(v, w)] = 0
+
+
+@function
+def apply_pair(c, v, w, pair, entry):
+    """Update the shared value of a pair by its joined sums, and reset them."""
+    count = c.sums_of[SumRow.COUNT, entry]
+    error, value = c.errors[entry], place_in_tables(c, v, w, pair)
+    rate = weight_of(c, v, pair, count)
+    mean = ti.cast(c.sums[entry], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
+    error = ti.select(count > 1, ti.cast(mean, ti.f32), error)
+    c.q[value] = c.q[value] + rate * error
+    note_best_actions(c, value)
+    c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
 
 
 @function
@@ -394,22 +444,22 @@ def draw_pair(c, v, w, chunk, ant, tick):
         drawn, c.streams[ant] = draw_below(c.streams[ant], model.visited(memory, at))
         pair, transition = model.recall(memory, at, drawn)
         pair += columns.group_of(c, v, ant) * v.n_numbers
-        add_to_sums(c, v, chunk, pair, 0.0, ti.cast(0, ti.i64), 1)
-        note_transition(c, v.n_pairs * chunk + pair, 0, transition)
+        entry = add_to_sums(c, v, chunk, pair, 0.0, ti.cast(0, ti.i64), 1)
+        note_transition(c, entry, 0, transition)
 
 
 @function
-def plan_together(c, v, w, tick):
-    """Update the pairs that ants drew for planning, by the table before this round of updates."""
-    join_sums(c, v, w)
-    chunk = w * c.n_chunks
-    listed = list_of(v, chunk)
-    for i in range(c.touched[listed]):
-        pair = c.touched[listed + 1 + i]
-        entry = v.n_pairs * chunk + pair
-        seen = c.sums_of[SumRow.TRANSITION, entry]
-        reward, terminated = model.reward_of(seen), model.terminated_of(seen)
-        error = error_of(c, v, w, pair, reward, terminated, model.next_state_of(seen), -1)
-        c.errors[entry] = error
-        c.sums[entry] = fixed(error) * c.sums_of[SumRow.COUNT, entry]
-    apply_sums(c, v, w)
+def join_plans(c, v, w, first, last):
+    """Join the pairs that ants drew for planning, with their errors by the present table."""
+    join_sums(c, v, w, first, last)
+    each_updated(c, v, w, first, last, find_error)
+
+
+@function
+def find_error(c, v, w, pair, entry):
+    """Compute the error of a pair that ants drew, and set its joined sums."""
+    seen = c.sums_of[SumRow.TRANSITION, entry]
+    reward, terminated = model.reward_of(seen), model.terminated_of(seen)
+    error = error_of(c, v, w, pair, reward, terminated, model.next_state_of(seen), -1)
+    c.errors[entry] = error
+    c.sums[entry] = fixed(error) * c.sums_of[SumRow.COUNT, entry]

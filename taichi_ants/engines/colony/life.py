@@ -9,14 +9,13 @@ from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below, high_word, stream_of
 from taichi_ants.engines.colony import layout
-from taichi_ants.engines.colony.columns import function, put, trait
+from taichi_ants.engines.colony.columns import chunks_of, function, put, trait
 from taichi_ants.engines.colony.layout import FoodSourceRow, NestRow, Stage, Tally, WorldRow
 from taichi_ants.engines.colony.learning import reset_slot
 from taichi_ants.engines.colony.steps import tally
 from taichi_ants.engines.colony.views import ant_view, nest_view
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
-from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, OBSTACLE, QUEEN
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, OBSTACLE, QUEEN, Event
 from taichi_ants.task.rules.policy import bit_number
 
 
@@ -25,7 +24,7 @@ def count(c, v, w, tick):
     """Add the tallies of all chunks to the counts of a world, and reset them."""
     # No `+=`, which would be atomic and slower: one thread processes a world.
     gives = 0
-    for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
+    for chunk in range(w * chunks_of(c, v), (w + 1) * chunks_of(c, v)):
         first = chunk * layout.TALLY_WIDTH
         gives += ti.cast(c.tallies[first + Tally.DELIVERIES], ti.i32)
         for row in ti.static(layout.TOTALS):
@@ -56,7 +55,7 @@ def count_by_nest(c, v, w):
         column, of_nest = w * v.n_nests + nest, 0
         for kind in ti.static(range(v.n_kinds)):
             i, n = ti.static(nest * v.n_kinds + kind), 0
-            for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
+            for chunk in range(w * chunks_of(c, v), (w + 1) * chunks_of(c, v)):
                 n += c.delivered[chunk * layout.NESTS_BY_KINDS + i]
                 c.delivered[chunk * layout.NESTS_BY_KINDS + i] = 0
             c.deliveries_by_nest_and_kind[column * v.n_kinds + kind] += n
@@ -69,7 +68,7 @@ def count_by_nest(c, v, w):
 @function
 def count_by_caste(c, v, w):
     """Add the deliveries of all chunks by caste to those of a world, and reset them."""
-    for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
+    for chunk in range(w * chunks_of(c, v), (w + 1) * chunks_of(c, v)):
         for i in range(v.n_castes):
             c.caste_deliveries[w * v.n_castes + i] += c.delivered_by_caste[chunk * MAX_CASTES + i]
             c.delivered_by_caste[chunk * MAX_CASTES + i] = 0

@@ -18,10 +18,13 @@ from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
+    BARRIER_SIZE,
     COLUMNS,
     NESTS_BY_KINDS,
+    SORTED_BITS,
     TALLY_WIDTH,
     TOTALS,
+    TOUCHED_LINE,
     FoodRow,
     NestRow,
     Order,
@@ -30,11 +33,13 @@ from taichi_ants.engines.colony.layout import (
     WorldRow,
     array_of,
     columns_of,
+    most_chunks,
     schedule_of,
 )
 from taichi_ants.engines.layout import compass_of, note_best_actions
 from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole
 from taichi_ants.features import arrays
+from taichi_ants.features.cues import arrays_of
 from taichi_ants.features.feature import ANT, CASTE, NEST, Array
 from taichi_ants.features.foods import food_numbers
 from taichi_ants.features.support import COLONY
@@ -46,8 +51,7 @@ from taichi_ants.learners.learner import Memory
 from taichi_ants.learners.policies import check_finite, checked_values, frozen_policy
 from taichi_ants.records import Snapshot, same
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW, Event
 from taichi_ants.task.field import TRAIL
 from taichi_ants.task.model import Model
 from taichi_ants.worlds.world import Start, World
@@ -149,8 +153,7 @@ class ColonyState:
         self.seeds = arguments.checked_seeds(seeds)
         running = runtime.start(threads, arch)
         runtime.check_on_cpu(running, "colonies run")
-        sizes = len(self.seeds), self.capacity, running.threads
-        self.schedule, self.chunks = schedule_of(schedule, *sizes)
+        self.schedule = schedule_of(schedule, len(self.seeds), self.capacity)
         self.n_kinds, self.n_nests = max(1, len(task.foods)), 0
         worlds = self.checked_worlds(world)
         self.n_nests, shape = worlds[0].n_nests, () if table is None else table.shape
@@ -165,6 +168,12 @@ class ColonyState:
         self.memory, model = Memory(), self.model
         if model.learner is not None and (self.one_a_slot or model.plans_together):
             self.memory = model.learner.memory_for(self.training, task.n_states)
+        # The states of all tables that ants of a world share, and the most chunks of a world.
+        self._shared_rows = model.n_rows if sharing == "shared" else 0
+        self.chunks = 1
+        if self.schedule == "by_chunk":
+            sizes = len(self.seeds), self.capacity, self._shared_rows * ROW, running.threads
+            self.chunks = most_chunks(*sizes)
         self.arrays: Arrays = {}
         self.lay_out(worlds)
         self.arrays |= (lasting := self._lasting(table))
@@ -415,17 +424,24 @@ class ColonyState:
         """Return the weight of the mean of n TD errors in an update, by n."""
         return update_weights(learning_rate, self.capacity if self.sharing == "shared" else 1)
 
-    def sort_ants(self) -> None:
-        """Sort the ants of a world roughly by cell, so that neighbours share caches.
+    @property
+    def can_sort(self) -> bool:
+        """Whether ants may change slots: not if slots matter, or some are vacant.
 
-        Ants have numbers, so their order does not change results. They are not sorted if slots
-        matter, or if some slots are vacant, because vacant slots must be the last ones.
+        Ants have numbers, so their order does not change results. Vacant slots are the last ones.
         """
-        if self.model.slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
-            return
-        # Keys of 16 bits, which NumPy sorts in a tenth of the time.
-        near = self.cells >> max(0, self.grid.size.bit_length() - 16)
-        self._sort_slots(near.astype(np.uint16))
+        living = self.arrays["worlds"][WorldRow.LIVING]
+        return not self.model.slots_matter and int(living.min()) == self.capacity
+
+    @property
+    def near_bits(self) -> int:
+        """The number of the lowest bits of a cell's number that do not matter to the order."""
+        return max(0, self.grid.size.bit_length() - SORTED_BITS)
+
+    def sort_ants(self) -> None:
+        """Sort the ants of a world roughly by cell, so that neighbours share caches."""
+        # NumPy sorts keys of 16 bits in a tenth of the time.
+        self._sort_slots((self.cells >> self.near_bits).astype(np.uint16))
 
     def close_gaps(self) -> None:
         """Move vacant slots behind those with ants, unless slots matter."""
@@ -565,10 +581,11 @@ class ColonyState:
 
     def _constants(self) -> Arrays:
         """Return constants of worlds and settings, and scratch arrays of a tick."""
-        chunks = len(self.seeds) * self.chunks
-        tables = self.model.n_groups if self.sharing == "shared" else 0
-        pairs = self.task.n_states * ROW * tables
-        sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
+        n_worlds, rows, touched = len(self.seeds), self._shared_rows, self._shared_rows * ROW + 1
+        chunks = sums = n_worlds * self.chunks
+        if self.schedule == "by_chunk":
+            sums, touched = n_worlds + chunks, TOUCHED_LINE * -(-rows // TOUCHED_LINE)
+        pairs, cells = max(1, sums * rows * ROW), n_worlds * self.grid.size
         return {
             **self.ground_constants(),
             "compass": compass_of(self.grid),  # see `rules.actions`
@@ -585,16 +602,16 @@ class ColonyState:
                 for number, dense in enumerate(self.model.dense_by_number)
                 if number and dense
             },
-            "orders": np.zeros(len(Order), np.int32),
-            "barrier": np.zeros(24, np.int64),  # see `kernels.wait_for_all`
+            "orders": np.array([self.chunks * (one == Order.CHUNKS) for one in Order], np.int32),
+            "barrier": np.zeros(BARRIER_SIZE, np.int64),  # see `barrier`
             "tallies": np.zeros(chunks * TALLY_WIDTH, np.int64),
             "delivered": np.zeros(chunks * NESTS_BY_KINDS, np.int32),  # by nest and kind
-            # By chunk and pair: fixed-point sums of TD errors, the last error, and `SumRow`.
-            "sums": np.zeros(sums, np.int64),
-            "errors": np.zeros(sums, np.float32),
-            "sums_of": np.zeros((len(SumRow), sums), np.int32),
-            # By chunk: the number of pairs with updates, then these pairs.
-            "touched": np.zeros(chunks * (pairs + 1), np.int32),
+            # See `learning`: fixed-point sums of TD errors, the last error, and `SumRow`; by world
+            # if there are chunks, and by chunk.
+            "sums": np.zeros(pairs, np.int64),
+            "errors": np.zeros(pairs, np.float32),
+            "sums_of": np.zeros((len(SumRow), pairs), np.int32),
+            "touched": np.zeros(max(1, sums * touched), np.int32),
         }
 
     def _settings(self) -> Arrays:
@@ -617,15 +634,17 @@ class ColonyState:
         return settings
 
     def ground_constants(self) -> Arrays:
-        """Return the constants that depend on rocks and the queen."""
+        """Return the constants that depend on the world."""
         return {
             # 1 for rocks and outside.
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
-            # By cell: a bit for each heading that leads nearer to the queen.
-            "closer": self._of_each(
-                lambda world: [world.closer(nest) for nest in range(world.n_nests)]
-            ).reshape(-1),
+            **{name: self._maps(make) for name, make in arrays_of(self.model.senses).items()},
         }
+
+    def _maps(self, make: Callable[[World, int], Any]) -> np.ndarray:
+        """Return an array of a cue that is not a pheromone, by world, nest and cell."""
+        maps = self._of_each(lambda world: [make(world, nest) for nest in range(world.n_nests)])
+        return maps.reshape(-1)
 
     def _of_each(self, make: Callable[[World], Any]) -> np.ndarray:
         """Return an array for each world, made once for equal worlds."""

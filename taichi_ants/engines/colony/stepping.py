@@ -5,14 +5,14 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import arguments, runtime
-from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, WorldRow
+from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, WorldRow, chunks_for
 from taichi_ants.engines.colony.state import ALL, ColonyState, Which
 from taichi_ants.errors import AntsError, as_array, checked_whole, count, entries_of, shown
 from taichi_ants.grid.randomness import words_of
@@ -21,37 +21,70 @@ from taichi_ants.worlds.world import World
 
 # Ants are sorted after this many steps of all ants, within limits in ticks.
 _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
+_SORT_SECONDS = 0.25  # about the time in which Taichi loads the kernel that sorts
 _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # checks of a thread at a barrier, which take at least half a second
-_LAUNCHES_BETWEEN_PROBES = 8  # also the factor by which a probe has fewer ticks
+# Trials of another number of threads: seconds in a launch, the share of all time, and the log of
+# the gain in speed for which the number changes.
+_TRIAL_SECONDS, _TRIAL_SHARE, _LEAST_GAIN = 0.002, 0.03, 0.02
 
 
 class ThreadChoice:
-    """The choice whether all threads share the ticks of a large world, or one does them alone.
+    """The choice of the number of threads that share the ticks of a large world: 1, 2, 4, ..., all.
 
     Threads that share a tick wait for each other several times, and they wait long if other
-    programs use the processors. So the slower choice is measured again from time to time.
+    programs use the processors. So the choice starts with all threads, and tries the next lower and
+    the next higher number in turn. A trial is one short launch with the other number and one with
+    the present number. The launches with the other number take at most `_TRIAL_SHARE` of all time.
     """
 
-    def __init__(self) -> None:
-        self._launches = 0
-        self.seconds_per_tick: dict[int, float] = {}  # by number of threads
+    def __init__(self, most: int = 1) -> None:
+        self.numbers = (*(2**i for i in range((most - 1).bit_length())), most)
+        self.at = len(self.numbers) - 1  # the place of the present number
+        self.gains: dict[int, float] = {}  # by place: log of the speed relative to the present one
+        self.seconds_per_tick: dict[int, float] = {}  # by number of threads, the last ones
+        self.allowance = 0.0  # seconds that trials may take by now
+        self._step = 1  # to the neighbour that was tried last, then the other one
+        self._pending: list[int] = []  # the places of a trial's launches that are left
+        self._ticks = 1  # in each of them
+        self._tried = 1.0  # seconds per tick in the first of them
 
     def plan(self, ticks: int, most: int) -> tuple[int, int]:
         """Return the number of ticks for the next launch, and of threads, up to `most`."""
-        if most == 1:
-            return ticks, 1
-        self._launches += 1
-        best, other = sorted((most, 1), key=lambda n: self.seconds_per_tick.get(n, math.inf))
-        if self._launches % _LAUNCHES_BETWEEN_PROBES == 2:
-            return max(1, ticks // _LAUNCHES_BETWEEN_PROBES), other
-        return ticks, best
+        if most != self.numbers[-1]:
+            vars(self).update(vars(ThreadChoice(most)))
+        pace = self.seconds_per_tick.get(self.numbers[self.at])
+        if not self._pending and pace is not None and most > 1:
+            step = -self._step if 0 <= self.at - self._step < len(self.numbers) else self._step
+            other, self._ticks = self.at + step, max(1, min(ticks, round(_TRIAL_SECONDS / pace)))
+            expected = self.seconds_per_tick.get(self.numbers[other], 2 * pace)
+            if self._ticks * expected <= self.allowance:
+                self._pending, self._step = [other, self.at], step
+        if self._pending:
+            return min(ticks, self._ticks), self.numbers[self._pending[0]]
+        return ticks, self.numbers[self.at]
+
+    def note(self, ticks: int, threads: int, seconds: float) -> None:
+        """Take notice of the time of a launch that followed the last plan."""
+        self.seconds_per_tick[threads] = seconds / ticks
+        self.allowance += _TRIAL_SHARE * seconds
+        if len(self._pending) == 2:
+            self.allowance -= seconds
+            self._tried = seconds / ticks
+        elif self._pending:
+            other = self.at + self._step
+            gain = math.log(seconds / ticks / self._tried)
+            self.gains[other] = gain + self.gains.get(other, 0.0) / 2
+            if self.gains[other] > _LEAST_GAIN:
+                self.at, self.gains = other, {}
+        self._pending = self._pending[1:]
 
 
 class TickingColony(ColonyState):
     """A colony whose ants observe, act and learn; `Colony` adds runs of whole episodes."""
 
     _piece = 1  # a number of ticks that takes less than _PIECE_SECONDS
+    _sort_seconds = 0.0  # spent on sorting by NumPy
     _launches = cached_property[dict[str, Any]](lambda colony: {})  # prepared kernels, by name
     _choice = cached_property(lambda colony: ThreadChoice())
 
@@ -198,48 +231,79 @@ class TickingColony(ColonyState):
             return
         interval = _STEPS_BETWEEN_SORTS // (n_worlds * self.capacity)
         interval = max(_FEWEST_TICKS, min(_MOST_TICKS, interval))
-        most = min(running, runtime.available_threads(), self.chunks)
+        most = min(running, runtime.available_threads(), n_worlds * self.chunks)
         while self.ticks < end:
-            if self.ticks % interval == 0:
-                self.sort_ants()
             piece = min(end - self.ticks, interval - self.ticks % interval)
             piece, threads = self._choice.plan(piece, most)
+            if self.ticks % interval == 0 and self.can_sort:
+                self._sort(threads)
             compiled, began = "ticks" in self._launches, time.perf_counter()
             self._launch_ticks(piece, threads)
             if compiled:
-                seconds = time.perf_counter() - began
-                self._choice.seconds_per_tick[threads] = seconds / piece
+                self._choice.note(piece, threads, time.perf_counter() - began)
+
+    def _sort(self, parts: int) -> None:
+        """Sort the ants: in a kernel, once NumPy has taken the time that the kernel costs."""
+        if self._sort_seconds >= _SORT_SECONDS:
+            self._launch_parts("sort", 0, parts)
+        else:
+            began = time.perf_counter()
+            self.sort_ants()
+            self._sort_seconds += time.perf_counter() - began
 
     def _launch(self, name: str) -> None:
-        """Launch a kernel by name: "ticks", or what ants do once, a function of `learning`."""
+        """Launch a kernel by name: "ticks", "sort", or what ants do once, see `learning`."""
         # The caller may have reset Taichi, or forked the process.
         runtime.check_on_cpu(runtime.start(), "colonies run")
         if name not in self._launches:
-            from taichi_ants.engines.colony import kernels, learning
             from taichi_ants.engines.launch import Launch
 
-            variant = kernels.variant(self.model)
-            kernel_of = partial(kernels.ticks, variant, self.schedule == "by_chunk")
-            if name != "ticks":
-                kernel_of = partial(kernels.once, variant, getattr(learning, name))
-            self._launches[name] = Launch(kernel_of)
-        self._launches[name]({**kernel_numbers(self), **self.arrays})
+            self._launches[name] = Launch(self._kernel_of(name))
+        values = {**kernel_numbers(self), **self.arrays}
+        if name == "sort":
+            read = "n_worlds", "n_slots", "orders", "barrier", *self.columns()
+            values = {name: values[name] for name in read}
+            values |= {"near_bits": self.near_bits, **self._scratch}
+        self._launches[name](values)
+
+    def _kernel_of(self, name: str) -> Callable[[Any], Any]:
+        """Return a function that makes a kernel for a type of arguments."""
+        from taichi_ants.engines.colony import kernels, learning, sorting
+
+        if name == "sort":
+            return partial(sorting.sort, self.columns())
+        variant = kernels.variant(self.model, self.schedule == "by_chunk")
+        if name == "ticks":
+            return partial(kernels.ticks, variant)
+        return partial(kernels.once, variant, getattr(learning, name))
+
+    @cached_property
+    def _scratch(self) -> dict[str, np.ndarray]:
+        from taichi_ants.engines.colony import sorting
+
+        n_worlds = len(self.seeds)
+        return sorting.scratch(n_worlds * self.capacity, n_worlds * self.chunks)
 
     def _launch_ticks(self, n: int, parts: int, threads: int = 1) -> None:
-        """Advance by n ticks in one launch, and a second one if the first gave up at a barrier."""
+        """Advance by n ticks in one launch."""
+        self._launch_parts("ticks", n, parts, threads)
+
+    def _launch_parts(self, name: str, n: int, parts: int, threads: int = 1) -> None:
+        """Launch a kernel with several parts, and again if the first one gave up at a barrier."""
         orders, barrier = self.arrays["orders"], self.arrays["barrier"]
-        orders[: Order.PASSED], barrier[:] = (n, parts, threads, 0, _SPINS), 0
+        chunks = chunks_for(parts, len(self.seeds), self.chunks)
+        orders[: Order.PASSED], barrier[:] = (n, parts, chunks, threads, 0, _SPINS), 0
         try:
-            self._launch("ticks")
+            self._launch(name)
         finally:  # Ctrl-C during a launch raises an error after it
             if (opened := int(barrier[Barrier.OPENED])) < 0:
                 orders[[Order.PARTS, Order.FIRST]] = 1, opened - GAVE_UP + 1
                 barrier[:] = 0
-                self._launch("ticks")
+                self._launch(name)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without Taichi's objects, so that copies and pickles work."""
-        made = "_piece", "_launches", "_choice", "model"
+        made = "_piece", "_sort_seconds", "_launches", "_choice", "_scratch", "model"
         return {name: value for name, value in vars(self).items() if name not in made}
 
 
@@ -255,7 +319,6 @@ def kernel_numbers(state: ColonyState) -> dict[str, Any]:
         "n_worlds": len(state.seeds),
         "n_ants": state.ants,  # at the start of an episode
         "n_slots": state.capacity,
-        "n_chunks": state.chunks,
         "n_food_sources": state.n_food_sources,  # room for food sources in each world
         "size": state.grid.size,
         "length": state.length,

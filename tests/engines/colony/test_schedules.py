@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import threading
+import time
+from collections import defaultdict
+from concurrent.futures import ThreadPoolExecutor
+from types import FunctionType, SimpleNamespace
+
 import numpy as np
 import pytest
 
 from taichi_ants import Colony, TrainingConfig, train, worlds
-from taichi_ants.engines.colony import layout, stepping
+from taichi_ants.engines.colony import barrier, state, stepping
 from taichi_ants.engines.colony.layout import Order
 from taichi_ants.engines.colony.stepping import ThreadChoice
 from taichi_ants.task import Field, Life, Pheromone, Task
@@ -21,6 +27,7 @@ LIVELY = Task(
     evaporation_in_training=True,
     life=Life(births=True, lifespan=60, regrowth=2, pile_move_interval=9),
 )
+PLAIN = Task(), Task()
 TRAINING = TrainingConfig("dyna_q", 0.2, 0.9, 0.4, 0.9, planning_steps=2)
 
 
@@ -48,9 +55,15 @@ def assert_same(first: dict, second: dict) -> None:
         assert np.array_equal(first[name], second[name]), name
 
 
+def use_chunks(monkeypatch, n: int) -> None:
+    """Let worlds have n chunks, for any number of threads."""
+    monkeypatch.setattr(state, "most_chunks", lambda *sizes: n)
+    monkeypatch.setattr(stepping, "chunks_for", lambda *sizes: n)
+
+
 def test_threads_and_schedules_give_the_same(monkeypatch):
     """Sixteen chunks of a world for two threads, so that their sums are joined."""
-    monkeypatch.setattr(layout, "_CHUNKS_PER_THREAD", 8)
+    use_chunks(monkeypatch, 16)
     monkeypatch.setattr(ThreadChoice, "plan", all_threads)
     expected = history(threads=1)
     # Another number of threads starts Taichi anew.
@@ -58,9 +71,93 @@ def test_threads_and_schedules_give_the_same(monkeypatch):
         assert_same(expected, history(threads=2, schedule=schedule))
 
 
+@pytest.mark.parametrize("seeds", [(3,), (3, 4, 5)])
+def test_any_number_of_chunks_gives_the_same(seeds, monkeypatch):
+    """Also odd ones: some ticks and a sort with each, by one thread and by two."""
+    use_chunks(monkeypatch, 16)
+    expected, colony, in_kernel, by_numpy = (
+        Colony(meadow(), task, TRAINING, seeds, ants=30, schedule=schedule, threads=2)
+        for task, schedule in ((LIVELY, "by_world"), *[(t, "by_chunk") for t in (LIVELY, *PLAIN)])
+    )
+    for one in (expected, colony, in_kernel, by_numpy):
+        one.begin_episode()
+    monkeypatch.setattr(stepping, "_SORT_SECONDS", np.inf)
+    for number, chunks in enumerate((1, 2, 3, 5, 8, 16)):
+        use_chunks(monkeypatch, chunks)
+        monkeypatch.setattr(
+            ThreadChoice, "plan", lambda _, ticks, most, n=number: (ticks, 1 + n % 2)
+        )
+        for one in (expected, colony, in_kernel, by_numpy):
+            one.tick(9)
+        assert_same({name: colony.arrays[name] for name in colony.stored}, expected.arrays)
+        in_kernel._launch_parts("sort", 0, parts)
+        by_numpy.sort_ants()
+        assert in_kernel == by_numpy
+    assert (in_kernel.numbers != np.arange(30)).any(axis=1).all()
+
+
+class Cell:
+    """A number of `barrier` in the test below."""
+
+    value = 0
+
+
+def run_barriers(parts: int, started: int, rounds: int, spins: int) -> list[list[int]]:
+    """The barriers that each part has passed, of parts in Python threads, of which some start."""
+    cells = defaultdict(Cell)
+    c = SimpleNamespace(barrier=cells, orders={Order.SPINS: spins})
+    begun, passed, lock = [0] * rounds, [[] for _ in range(started)], threading.Lock()
+
+    def add(cell, n):
+        time.sleep(0)  # lets another thread run
+        with lock:
+            cell.value += n
+            return cell.value - n
+
+    cast = SimpleNamespace(cast=lambda value, kind: int(value), i32=int, i64=int, min=min)
+    cast.select, cast.atomic_add = lambda condition, a, b: a if condition else b, add
+
+    def live(part):
+        for number in range(rounds):
+            with lock:
+                begun[number] += 1
+            if wait(c, part, parts, number) == 0:
+                break
+            assert begun[number] == parts
+            passed[part].append(number)
+
+    wait = FunctionType(barrier.wait_for_all.__wrapped__.__code__, {**vars(barrier), "ti": cast})
+    with ThreadPoolExecutor(started) as pool:
+        list(pool.map(live, range(started)))
+    return passed
+
+
+@pytest.mark.parametrize("parts", [2, 3, 5, 8, 9, 10, 17, 26])
+def test_barriers_hold_any_number_of_parts(parts):
+    """In Python threads, because few processors cannot run many kernels at once."""
+    assert run_barriers(parts, parts, 6, 10**9) == [list(range(6))] * parts
+    assert run_barriers(parts, parts - 1, 6, 50) == [[]] * (parts - 1)  # one does not come
+
+
+@pytest.mark.parametrize("best", [1, 2, 8, 12])
+def test_threads_are_chosen_by_short_trials(best):
+    """Noise of up to 20 %, and a pace that is half a fifth lower at each neighbour."""
+    choice, rng, passed, in_trials = ThreadChoice(), np.random.default_rng(best), 0.0, 0.0
+    numbers = [1, 2, 4, 8, 12]
+    while passed < 20:
+        ticks, threads = choice.plan(100, 12)
+        steps = abs(numbers.index(threads) - numbers.index(best))
+        seconds = ticks * 2e-4 * 1.2**steps * rng.uniform(1, 1.2)
+        in_trials += seconds * (threads != choice.numbers[choice.at])
+        passed += seconds
+        choice.note(ticks, threads, seconds)
+    assert in_trials <= 0.03 * passed
+    assert choice.numbers[choice.at] == best
+
+
 def test_threads_that_do_not_come_are_not_waited_for_without_end(monkeypatch):
     """Seven parts for two threads: the first two leave the barrier, the rest is done by one."""
-    monkeypatch.setattr(layout, "_CHUNKS_PER_THREAD", 8)
+    use_chunks(monkeypatch, 16)
     monkeypatch.setattr(stepping, "_SPINS", 1000)
     monkeypatch.setattr(ThreadChoice, "plan", lambda choice, ticks, most: (ticks, 7))
     given_up, options = 0, {"ants": 30, "threads": 2}
