@@ -1,9 +1,9 @@
 """Compare the speed of a colony with a program in C that does the same.
 
 Ants are spread over open worlds, with eight cells per ant, and learn into one table by Q-learning,
-under the rules of `paper()` and of `foraging()`. The program colony.c does the same with as many
-threads, and its results are bit-for-bit equal. CC sets its compiler. Otherwise it is clang, which
-makes it faster than gcc does, or gcc if threads need OpenMP and clang has none. The command
+under the rules of `paper()`, `foraging()` and `queueing()`. The program colony.c does the same with
+as many threads, and its results are bit-for-bit equal. CC sets its compiler. Otherwise it is clang,
+which makes it faster than gcc does, or gcc if threads need OpenMP and clang has none. The command
 measures both in turn, several times. The table contains medians, and ratios above 1 where Taichi
 Ants is faster. On a busy machine, use `--threads 1`, which is measured by processor time; several
 threads in C wait long for each other.
@@ -28,13 +28,14 @@ from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.colony.stepping import kernel_numbers
 from taichi_ants.errors import AntsError, count
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
-from taichi_ants.task import foraging
+from taichi_ants.task import foraging, queueing
 
 SOURCE = ENGINE / "colony.c"
-TASKS = {"the paper's": Task(), "foraging": foraging()}
+TASKS = {"the paper's": Task(), "foraging": foraging(), "queueing": queueing()}
 Q_LEARNING = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.97)
 _SECONDS = 0.3  # the shortest measurement
 _ANT_SHIFT = 4  # of colony.c
+RULES = {"paper": 0, "ants": 7, "queues": 15}  # of colony.c, by the observation of a task
 
 
 class CColony(ctypes.Structure):
@@ -50,6 +51,8 @@ class CColony(ctypes.Structure):
         ("explore_below", ctypes.c_uint64),
         *((name, ctypes.c_void_p) for name in ("weights", "rewards")),
         ("counts", ctypes.c_int64 * 4),
+        *((name, ctypes.c_int32) for name in ("regrowth", "sources")),
+        *((name, ctypes.c_void_p) for name in ("source_at", "taken")),
     )
 
 
@@ -113,7 +116,8 @@ def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) ->
         **{name: numbers[name] for name in names},
         **{name: array.ctypes.data for name, array in kept.items()},
     )
-    library.run(ctypes.byref(in_c), int(colony.task.traffic.shared), ticks, threads)
+    rules = RULES[colony.task.observation]
+    library.run(ctypes.byref(in_c), rules, ticks, threads)
     return Lived(kept["q"].reshape(colony.task.n_states, -1)[:, :5], *in_c.counts)
 
 

@@ -87,7 +87,7 @@ MUTATIONS = [
     ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
     ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
     ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
-    ("task/model.py", "followed = carriers_follow if", "followed = outbound if", CHOICE),
+    ("task/model.py", "task.choice.carriers_follow or ", "", CHOICE),
     ("measures/tidy.py", "column.startswith(f", "column == (f", RESULTS_OF_RUNS),
     ("rendering/rasteriser.py", "ANTS[snapshot.ant_nests]", "ANTS[0 * snapshot.ant_nests]", RASTER),
     (
@@ -385,8 +385,8 @@ MUTATIONS = [
     # Designs.
     ("studies/design.py", "margin = 0.5 if axis.whole else 0.0", "margin = 0.0", DESIGN),
     ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
-    ("studies/design.py", "random_base2(whole)[:n]", "random_base2(whole)", DESIGN),
-    ("studies/design.py", '"seed": RANDOM_SEED', '"seed": 0', DESIGN),
+    ("studies/design.py", "from_last[-1] = True", "from_last[-1] = False", DESIGN),
+    ("studies/design.py", "default_rng(RANDOM_SEED)", "default_rng(0)", DESIGN),
     # Archives of studies, and descriptions of models.
     ("commands/reproduce.py", "> MOST_BYTES:", "> 2 * MOST_BYTES:", ARCHIVE),
     ("commands/reproduce.py", "sum(map(bool, diff", "0 * sum(map(bool, diff", ARCHIVE),

@@ -1,7 +1,7 @@
 """Compare the speed of training the paper's grid with two programs in C that do the same.
 
 The command trains the paper's 16 configurations of each learner with several seeds; a delivery
-truncates the episode. The program ant.c is straightforward C, which does one run after another. The
+truncates the episode. The program ant.c is C without vector instructions and with few branches. The
 program ant_vector.c does sixteen runs at a time, in the lanes of AVX-512 vectors. Both are compiled
 with -O3 for this processor, and their results are bit-for-bit equal to those of Taichi Ants. The
 command measures all three in turn, several times. The table contains medians, and ratios above 1
@@ -74,7 +74,7 @@ class CJob(ctypes.Structure):
             for name in ("n", "learner", "planning_steps", "delivery_truncates")
         ),
         *((name, ctypes.c_int32) for name in ("episodes", "max_steps", "threads")),
-        *((name, ctypes.c_void_p) for name in ("q", "returns", "steps")),
+        *((name, ctypes.c_void_p) for name in ("q", "returns", "steps", "deliveries")),
     )
 
 

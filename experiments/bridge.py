@@ -19,7 +19,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     import bridge_report as shown
     import numpy as np
-    from bridge_report import BRIDGES, DESIGNS, LATE, LOADS, WINDOWS, Design, bridges
+    from bridge_report import BRIDGES, CASES, LATE, LOADS, WINDOWS, Case, bridges
     from colony import LEARNING, scheduled
 
     from taichi_ants import AntsError, Colony, Life, Task, files
@@ -63,7 +63,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return command_line.with_folder(settings, "bridge")
 
 
-def task(design: Design) -> Task:
+def task(design: Case) -> Task:
     """Return the rules of a design; food grows back at once."""
     rules, kind = {"queueing": queueing, "foraging": foraging}[design.rules](), design.evaporation
     evaporation: dict[str, Any] = {"evaporation": kind}
@@ -73,7 +73,7 @@ def task(design: Design) -> Task:
     return replace(rules, pheromone=trail, life=Life(regrowth=0))
 
 
-def point(design: Design, episodes: int, ticks: int) -> ColonyPoint:
+def point(design: Case, episodes: int, ticks: int) -> ColonyPoint:
     """Return the training of colonies of a design.
 
     The short branch is on the right in about half of the episodes and on the left in the others, so
@@ -87,7 +87,7 @@ def point(design: Design, episodes: int, ticks: int) -> ColonyPoint:
 
 @dataclass(frozen=True)
 class Plan:
-    """The study, with a point for each of `DESIGNS`, and the ticks of an evaluation."""
+    """The study, with a point for each of `CASES`, and the ticks of an evaluation."""
 
     study: Study
     ticks: int
@@ -97,13 +97,13 @@ def plan(options: Mapping[str, Any]) -> Plan:
     """Return the study."""
     seeds = tuple(range(options["seed"], options["seed"] + options["seeds"]))
     ticks, lengths = options["evaluation_ticks"], (options["episodes"], options["ticks"])
-    designs = {point(design, *lengths): design for design in DESIGNS}
+    designs = {point(design, *lengths): design for design in CASES}
     followed = partial(crossed, designs, ticks)
     return Plan(Study(tuple(designs), seeds, (f"crossings_{ticks}",), followed), ticks)
 
 
 def crossed(
-    designs: Mapping[ColonyPoint, Design],
+    designs: Mapping[ColonyPoint, Case],
     ticks: int,
     points: Sequence[ColonyPoint],
     seeds: Sequence[int],
@@ -137,7 +137,7 @@ def tables(plan: Plan, results: Results) -> str:
             name: np.moveaxis(arrays[f"crossings_{plan.ticks}.{BRIDGES.index(name)}"][row], 0, -1)
             for name in bridges(design)
         }
-        for row, design in enumerate(DESIGNS)
+        for row, design in enumerate(CASES)
     }
     table = shown.rows(found, plan.study.seeds, plan.ticks)
     files.write_csv(results.folder / "shares.csv", table, list(table[0]))

@@ -29,8 +29,8 @@ WINDOWS = 10  # parts of an evaluation; the late share is that of the second hal
 
 
 @dataclass(frozen=True)
-class Design:
-    """The rules of a colony and the bridge on which it learns.
+class Case:
+    """A case of the study: the rules of a colony and the bridge on which it learns.
 
     Attributes:
         rules: "queueing" or "foraging", see `taichi_ants.task`.
@@ -46,27 +46,27 @@ class Design:
     evaporation: str = "linear"
 
 
-# Settings and the values to which each is changed alone, from the default design.
+# Settings and the values to which each is changed alone, from the default case.
 PANELS: dict[str, tuple[Any, ...]] = {
     "ants": (8, 16, 32, 64),
     "slope": (1, 2, 5, 10, 20),
     "evaporation": ("none", "linear", "100", "20"),
 }
-OTHERS = (Design(aside=0), Design(rules="foraging"), Design(rules="foraging", aside=0))
-DESIGNS = tuple(
+OTHERS = (Case(aside=0), Case(rules="foraging"), Case(rules="foraging", aside=0))
+CASES = tuple(
     dict.fromkeys(
-        [Design(), *OTHERS]
-        + [replace(Design(), **{name: one}) for name, some in PANELS.items() for one in some]
+        [Case(), *OTHERS]
+        + [replace(Case(), **{name: one}) for name, some in PANELS.items() for one in some]
     )
 )
 # Designs that are also evaluated on a bridge whose short branch opens late.
-LATE_DESIGNS = (Design(), *OTHERS, Design(evaporation="none"))
+LATE_CASES = (Case(), *OTHERS, Case(evaporation="none"))
 
 # Crossings by design and bridge, int64 (windows, loads, branches, seeds), the short branch first.
-Crossings = Mapping[Design, Mapping[str, np.ndarray]]
+Crossings = Mapping[Case, Mapping[str, np.ndarray]]
 
 
-def bridges(design: Design) -> dict[str, dict[str, Any]]:
+def bridges(design: Case) -> dict[str, dict[str, Any]]:
     """Return the bridges on which a design is evaluated, as arguments of `double_bridge`.
 
     On the bridge `LATE`, rock closes the short branch for the first half of the time.
@@ -76,7 +76,7 @@ def bridges(design: Design) -> dict[str, dict[str, Any]]:
     found = {SHORT_RIGHT: unequal, SHORT_LEFT: {**unequal, "mirrored": True}, EQUAL: equal}
     if design.aside:
         found[EQUAL_ASIDE] = {**equal, "aside": design.aside}
-    if design in LATE_DESIGNS:
+    if design in LATE_CASES:
         found[LATE] = unequal
     return found
 
@@ -105,7 +105,7 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
 
 def report(found: Crossings, ticks: int) -> str:
     """Return tables of the late shares of all designs and of the shares after a late opening."""
-    headers = [*asdict(Design())]
+    headers = [*asdict(Case())]
     lines, late = [], []
     for design, bridges in found.items():
         row = [*map(str, asdict(design).values())]
@@ -142,7 +142,7 @@ def _cell(values: np.ndarray) -> str:
 
 
 def _means(found: Crossings) -> str:
-    seeds = next(iter(found[Design()].values())).shape[-1]
+    seeds = next(iter(found[Case()].values())).shape[-1]
     if seeds < LEAST_SEEDS:
         few = f"too few for intervals (use {LEAST_SEEDS} or more)"
         return f"means over {count(seeds, 'seed')}, {few}"
@@ -161,11 +161,11 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
         above, below = figure.subplots(2, len(PANELS), sharey=True)
         for axes, (bridge, title) in zip(above, titles.items(), strict=True):
             # The food of equal branches is never aside.
-            ahead = {} if bridge == EQUAL else {", food ahead": found[Design(aside=0)][bridge]}
-            _draw_shares(axes, {"": found[Design()][bridge], **ahead}, ticks)
+            ahead = {} if bridge == EQUAL else {", food ahead": found[Case(aside=0)][bridge]}
+            _draw_shares(axes, {"": found[Case()][bridge], **ahead}, ticks)
             axes.set(title=title, xlabel="Tick")
         for axes, (name, values) in zip(below, PANELS.items(), strict=True):
-            several = [found[replace(Design(), **{name: value})] for value in values]
+            several = [found[replace(Case(), **{name: value})] for value in values]
             sides = [
                 [late_shares(one[side]) for side in (SHORT_RIGHT, SHORT_LEFT)] for one in several
             ]
@@ -175,7 +175,7 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
             if name != "evaporation":
                 axes.set_xticks(values)
         caption = (
-            f"{sentence(_means(found))}. Upper row: {Design().ants} ants.\n"
+            f"{sentence(_means(found))}. Upper row: {Case().ants} ants.\n"
             "Lower row: food aside, one setting varies; second half of the time, mean of both "
             "mirror images.\nEvaporation: none, 1 per tick (linear), or a half-life in ticks."
         )
@@ -189,9 +189,9 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
 def draw_late(path: Path, found: Crossings, ticks: int) -> None:
     """Draw the shares before and after the short branch opens, for three designs."""
     panels = {
-        "Food aside": Design(),
-        "Food ahead": Design(aside=0),
-        "Food aside, no evaporation": Design(evaporation="none"),
+        "Food aside": Case(),
+        "Food ahead": Case(aside=0),
+        "Food aside, no evaporation": Case(evaporation="none"),
     }
     with style.styled():
         figure = style.new_figure(3.2)
@@ -203,7 +203,7 @@ def draw_late(path: Path, found: Crossings, ticks: int) -> None:
             axes.set(title=title, xlabel="Tick", xticks=[0, ticks, 2 * ticks])
         several[0].set(ylabel="Crossings (%)", ylim=(0, 103))
         caption = (
-            f"{sentence(_means(found))}; {Design().ants} ants that have learned with both branches "
+            f"{sentence(_means(found))}; {Case().ants} ants that have learned with both branches "
             "open and follow their final policy.\nIn the model of Goss and others, no colony "
             "switches to a short branch that opens late."
         )

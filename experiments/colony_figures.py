@@ -27,8 +27,8 @@ def draw_all(rows: Rows) -> dict[str, Figure]:
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
-def _dots(title: str, designs: Sequence[study.Design], rows: Rows) -> Figure | None:
-    panels: dict[str, dict[study.Design, study.ConditionRow]] = {}
+def _dots(title: str, designs: Sequence[study.Trained], rows: Rows) -> Figure | None:
+    panels: dict[str, dict[study.Trained, study.ConditionRow]] = {}
     for row in sorted(rows, key=lambda row: row.condition.ants):
         if row.design in designs:  # larger colonies replace smaller ones
             panels.setdefault(row.condition.world_kind, {})[row.design] = row
@@ -76,7 +76,7 @@ def _dot(axis: Axes, place: int, row: study.ConditionRow) -> None:
     )
 
 
-def _lines(title: str, designs: Sequence[study.Design], rows: Rows) -> Figure | None:
+def _lines(title: str, designs: Sequence[study.Trained], rows: Rows) -> Figure | None:
     measures = "deliveries", "per_ant"
     world_kinds = [
         one for one in study.WORLD_KINDS if any(row.condition.world_kind == one for row in rows)
@@ -115,8 +115,8 @@ def _spread(rows: Rows) -> str:
     return f"{means}. Exploration rate {study.EVALUATION_EPSILON:g}."
 
 
-def _each(rules: Iterable[str], *regimes: str) -> list[study.Design]:
-    return [study.Design(one, regime) for one in rules for regime in regimes]
+def _each(rules: Iterable[str], *regimes: str) -> list[study.Trained]:
+    return [study.Trained(one, regime) for one in rules for regime in regimes]
 
 
 _LEARNED = study.ALONE, study.FEW, study.SOME, study.JOINT

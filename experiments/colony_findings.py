@@ -54,7 +54,7 @@ REGIMES: dict[str, str] = _FILE["regimes"]
 JOINT, ALONE, FEW, SOME, ABROAD = REGIMES
 
 
-class Design(NamedTuple):
+class Trained(NamedTuple):
     """Rules and a training regime, by their names in `RULES` and `REGIMES`."""
 
     rules: str
@@ -91,7 +91,7 @@ Sizes = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Series:
+class Contrasts:
     """Differences between two designs, first minus second, for several numbers of ants.
 
     Attributes:
@@ -105,8 +105,8 @@ class Series:
 
     question: str
     statement: str
-    first: Design
-    second: Design
+    first: Trained
+    second: Trained
     measure: str = "deliveries"
     against: Literal["same", "smaller"] = "same"
     least: int = 2
@@ -132,12 +132,12 @@ class Series:
 
 
 SERIES = tuple(
-    Series(**{**one, "first": Design(*one["first"]), "second": Design(*one["second"])})
+    Contrasts(**{**one, "first": Trained(*one["first"]), "second": Trained(*one["second"])})
     for one in _FILE["series"]
 )
 QUESTIONS: tuple[str, ...] = tuple(dict.fromkeys(series.question for series in SERIES))
 # By the name of the kind of world and the series.
-Judged = dict[tuple[str, Series], dict[Sizes, Finding]]
+Judged = dict[tuple[str, Contrasts], dict[Sizes, Finding]]
 
 
 def judge_all(measured: Measured) -> Judged:
@@ -176,9 +176,9 @@ class ConditionRow(NamedTuple):
     ranges: Mapping[str, tuple[float, float]]
 
     @property
-    def design(self) -> Design:
+    def design(self) -> Trained:
         """Its rules and training regime."""
-        return Design(self.condition.rules, self.condition.regime)
+        return Trained(self.condition.rules, self.condition.regime)
 
     def columns(self) -> dict[str, Any]:
         """Return the columns of conditions.csv."""
@@ -235,7 +235,7 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
     abroad = [one for one in rows if one.condition.regime == ABROAD]
     tables = []
     for world_kind in WORLD_KINDS:
-        by_design: dict[Design, dict[int, ConditionRow]] = {}
+        by_design: dict[Trained, dict[int, ConditionRow]] = {}
         for one in trained:
             if one.condition.world_kind == world_kind:
                 by_design.setdefault(one.design, {})[one.condition.ants] = one
@@ -284,7 +284,7 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
     """Return deliveries of the largest colonies: a row per design, a column per kind of world."""
     sizes = [one.condition.ants for one in rows if one.condition.regime != ABROAD]
     largest = max(sizes, default=0)
-    shown: dict[str, dict[Design, ConditionRow]] = {name: {} for name in WORLD_KINDS}
+    shown: dict[str, dict[Trained, ConditionRow]] = {name: {} for name in WORLD_KINDS}
     for one in rows:
         if one.condition.ants == largest and one.condition.world_kind in shown:
             shown[one.condition.world_kind][one.design] = one
@@ -298,8 +298,8 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
         with_, without = (number(row.estimates[n].mean, digits) for n in ("deliveries", "greedy"))
         return f"{with_} ({without}), {percent(row.estimates['bound_share'].mean)}"
 
-    alone = [Design(rules, ALONE) for rules in (PAPER, ABC)]
-    designs = [alone[0], *map(Design, RULES), alone[1]]
+    alone = [Trained(rules, ALONE) for rules in (PAPER, ABC)]
+    designs = [alone[0], *map(Trained, RULES), alone[1]]
     cells = [
         [sentence(one.words), *(cell(by_design.get(one)) for by_design in shown.values())]
         for one in designs

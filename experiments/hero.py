@@ -33,8 +33,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.rendering.colours import Mark, channels
     from taichi_ants.rendering.rasteriser import draw_marks, marks
     from taichi_ants.studies.command_line import Parser, run_command
-    from taichi_ants.task.constants import FOOD, OBSTACLE
-    from taichi_ants.task.events import Event
+    from taichi_ants.task.constants import FOOD, OBSTACLE, Event
 
 ROOT = Path(__file__).parents[1]
 # The dots of an ant, (x, y, radius) in sizes of a hexagon: it looks along y.

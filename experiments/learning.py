@@ -27,8 +27,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.command_line import Parser, given_world, run_command, whole_number
     from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import Rewards, Task
-    from taichi_ants.task.constants import N_ACTIONS
-    from taichi_ants.task.events import Event
+    from taichi_ants.task.constants import N_ACTIONS, Event
 
 CHECKPOINTS = [0, 1, 2, 20]  # in the paper's world, behaviour differs most between these
 # Heights in multiples of the text size: a tile's title, a second line below it, all text of a tile,

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     )
     from taichi_ants.envs.formats import tabulate
     from taichi_ants.errors import AntsError
+    from taichi_ants.lab import replay
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import load_policy, save_policy
     from taichi_ants.offline.dataset import Dataset
@@ -56,6 +57,7 @@ _NAMES_IN = {
     ),
     "envs.formats": ("tabulate",),
     "errors": ("AntsError",),
+    "lab": ("replay",),
     "learners.config": ("TrainingConfig",),
     "learners.policies": ("load_policy", "save_policy"),
     "offline.dataset": ("Dataset",),
@@ -69,8 +71,8 @@ __all__ = [
     "Life", "Observation", "Pheromone", "Rewards", "Rollouts", "Task", "Trace", "TrainingConfig",
     "TrainingResult", "When", "World", "__version__", "analysis", "compare", "continue_training",
     "envs", "evaluate", "learners", "load_policy", "measures", "offline", "plot", "record",
-    "record_colony", "reference", "rendering", "rollout", "rules", "save_policy", "states",
-    "summary", "tabulate", "task", "testing", "trace_training", "train", "worlds",
+    "record_colony", "reference", "rendering", "replay", "rollout", "rules", "save_policy",
+    "states", "summary", "tabulate", "task", "testing", "trace_training", "train", "worlds",
 ]  # fmt: skip
 __dir__ = __all__.copy  # completion lists only public names
 

@@ -13,7 +13,7 @@ cells, which can differ between the worlds of a colony.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
@@ -64,13 +64,10 @@ class ShorthandSettings(Settings):
         """Return the record that a mapping or a short form stands for; else the value itself."""
         if isinstance(value, cls):
             return value
-        values = value if isinstance(value, Mapping) else cls._short(value)
+        values = value if settings.is_table(value) else cls._short(value)
         if values is None:
             return value
-        for setting in declared(cls):
-            if setting.default is MISSING and setting.name not in values:
-                raise AntsError(f"`{cls.path}.{setting.name}` is missing; add it.")
-        return cls(**values)
+        return cls(**{**cls._required(values), **values})
 
     @classmethod
     def _short(cls, value: Any) -> dict[str, Any] | None:
@@ -268,10 +265,10 @@ class SetTask(Intervention, path="task"):
     in_all_worlds = True
 
     def check(self) -> None:
-        if not self.values:
+        if not (changes := settings.table_of("task", self.values)):
             raise AntsError("`task` has no settings; name at least one, with its new value.")
         values = []
-        for name, value in self.values:
+        for name, value in changes.items():
             group, entry, *_ = [*name.split("."), "", ""]
             known = {setting.path: setting for setting in settings.all_of(Task)}
             if entry and group in _NAMED:
@@ -284,10 +281,7 @@ class SetTask(Intervention, path="task"):
 
     @classmethod
     def converted(cls, value: Any) -> Any:
-        if not isinstance(value, Mapping):
-            return value
-        numbers = settings.flat({k: v for k, v in value.items() if isinstance(k, str)})
-        return cls(tuple(numbers.items()))
+        return cls(tuple(settings.flat(value).items())) if settings.is_table(value) else value
 
     def as_dict(self) -> dict[str, Any]:
         return dict(self.values)

@@ -26,6 +26,7 @@ import math
 import operator
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, replace
 from functools import cache, partial, reduce, wraps
 from inspect import signature
@@ -38,6 +39,7 @@ from typing import (
     Generic,
     Literal,
     NamedTuple,
+    TypeGuard,
     TypeVar,
     Union,
     get_args,
@@ -178,7 +180,7 @@ class DeclaredSetting(NamedTuple):
                 return operator.index(value)
             if self.kind is float:
                 return float(value) if isinstance(value, Real) and math.isfinite(value) else None
-        except (TypeError, OverflowError):  # integers can be too large for a float
+        except (TypeError, ValueError, OverflowError):  # integers can be too large for a float
             return None
         if self.kind is str:
             value = os.fspath(value) if isinstance(value, os.PathLike) else value
@@ -249,7 +251,7 @@ class Settings:
         cls.path = path or cls.path
 
     def __new__(cls, /, *values: Any, **named: Any) -> Any:
-        known = cls.__dataclass_fields__  # type: ignore[attr-defined]
+        known = [field.name for field in fields(cls)]  # type: ignore[arg-type]
         for name in named:  # Python's own message has no path and no similar names
             if name not in known:
                 raise AntsError(f"`{_below(cls.path, name)}` {not_a_setting(name, known)}")
@@ -338,7 +340,7 @@ class Settings:
                     changes[name] = setting.default
             elif isinstance(value := changes.get(name), Mapping) and setting.kind is Named:
                 changes[name] = setting._named(value, getattr(self, name))
-            elif isinstance(value, Mapping) and setting.is_group:
+            elif setting.is_group and is_table(value):
                 inner = dict(value)
                 start = setting.checked(inner.pop("")) if "" in inner else getattr(self, name)
                 changes[name] = start.replace(**inner)
@@ -347,9 +349,18 @@ class Settings:
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
         """Return the settings in a mapping, checked; groups are mappings or names."""
-        if not isinstance(facts, Mapping):
+        return cls(**cls._required(facts)).replace(**facts)
+
+    @classmethod
+    def _required(cls, facts: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the settings that have no default; AntsError if one is missing in a table."""
+        if not is_table(facts):
             refuse(f"`{cls.path}`", facts, "a table of settings")
-        return cls().replace(**facts)
+        required = [setting for setting in declared(cls) if setting.default is MISSING]
+        for setting in required:
+            if setting.name not in facts:
+                raise AntsError(f"`{setting.path}` is missing; add it.")
+        return {setting.name: facts[setting.name] for setting in required}
 
 
 Entry = TypeVar("Entry")
@@ -418,7 +429,7 @@ def _read(cls: Any) -> tuple[DeclaredSetting, ...]:
         origin, inner = get_origin(kind), get_args(kind)
         words = inner if origin is Literal else ()
         entry = inner[0] if origin is Named else NoneType
-        kind = {Literal: str, Named: Named, Sequence: list}.get(origin, kind)
+        kind = {Literal: str, Named: Named, Sequence: list}.get(origin or kind, kind)
         path = _below(getattr(cls, "path", "world"), name)  # functions build worlds
         settings.append(DeclaredSetting(name, path, kind, words, optional, default, rule, entry))
     return tuple(settings)
@@ -477,6 +488,19 @@ def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
         return f"is not a setting{of}, which has none; leave it out."
     choice = _either(near) if len(near) <= 2 else f"one of {', '.join(near)}"
     return f"is not a setting{of}; choose {choice}."
+
+
+def is_table(value: object) -> TypeGuard[Mapping[str, Any]]:
+    """Return whether a value is a mapping whose names are text."""
+    return isinstance(value, Mapping) and all(isinstance(name, str) for name in value)
+
+
+def table_of(path: str, values: Any) -> Mapping[str, Any]:
+    """Return a table of settings, or pairs of a name and a value, as a table; else AntsError."""
+    with suppress(TypeError, ValueError):
+        if is_table(table := dict(values)):
+            return table
+    refuse(f"`{path}`", values, "a table of settings")
 
 
 def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:

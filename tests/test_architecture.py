@@ -29,7 +29,7 @@ LAYERS = (
     {"interventions"},
     {"protocol"},
     {"engines", "reference"},
-    {"analysis", "rendering", "testing"},
+    {"analysis", "lab", "rendering", "testing"},
     {"offline"},
     {"viewer", "envs"},
     {"live", "studies"},

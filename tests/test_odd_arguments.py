@@ -52,7 +52,6 @@ ODD = {
     "a reward": lambda _: Rewards(deliver=HUGE),
     "cells": lambda _: WORLD.grid.index(RAGGED),
     "a far cell": lambda _: WORLD.grid.index([(2**63, 0, 0)]),
-    "far cells": lambda _: WORLD.grid.number([(2**62, -(2**62), 0)]),
     "index": lambda _: WORLD.grid.cells(RAGGED),
     "a learner": lambda _: learners.get(LONG),
     "no learner": lambda _: learners.get(["sarsa"]),

@@ -55,7 +55,7 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
     others = ("report.css", "report.js")
     page |= {f"taichi_ants/report/{name}" for name in (*templates, *others)}
     page |= {f"taichi_ants/live/{name}" for name in PARTS}
-    page |= {"taichi_ants/analysis/taichi_ants.mplstyle"}
+    page |= {"taichi_ants/analysis/taichi_ants.mplstyle", "taichi_ants/worlds/lab.json"}
     assert set(names) == sources("taichi_ants") | {"taichi_ants/py.typed"} | page
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import pickle
 import re
+from contextlib import suppress
 from copy import deepcopy
-from dataclasses import MISSING, asdict, dataclass, field, replace
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
+from itertools import product
 from operator import attrgetter
 from typing import Annotated, Literal
 
@@ -17,6 +19,9 @@ import pytest
 from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig, learners
+from taichi_ants.interventions import INTERVENTIONS, Clear
+from taichi_ants.protocol import EVENTS as EVENTS_BY_NAME
+from taichi_ants.rules.rule import RULES
 from taichi_ants.settings import (
     DeclaredSetting,
     Named,
@@ -27,6 +32,7 @@ from taichi_ants.settings import (
     named_groups,
     nested,
 )
+from taichi_ants.studies.design import Design
 from taichi_ants.task import Task
 from taichi_ants.worlds import double_bridge, open_world
 
@@ -88,6 +94,48 @@ def test_defaults_and_bounds_are_allowed_and_plain(one):
         assert one.checked(np.True_) is True
     assert one.rule.help
     assert not one.rule.help.endswith(".")
+
+
+EVENTS = (*INTERVENTIONS.values(), *EVENTS_BY_NAME.values())
+CLASSES = dict.fromkeys(
+    cls
+    for kind in (Task, TrainingConfig, Design, *EVENTS)
+    for cls in (kind, *(one.entry if one.kind is Named else one.kind for one in all_of(kind)))
+    if is_dataclass(cls)
+)
+NEEDED = {
+    "learner": "sarsa", "learning_rate": 0.1, "discount": 0.9, "epsilon": 0.1,
+    "epsilon_decay": 0.9, "number": 3, "what": "food", "cells": [(0, 0, 0)], "level": 3,
+    "value": 0.5, "tick": 3, "ticks": 3, "measure": "ants", "above": 3,
+    "values": {"pheromone.level": 5},
+}  # fmt: skip
+ODD = (
+    *(None, True, 2**40, -1, 10**5000, 1.5, math.nan, 1j, "x", b"x", "\ud800", np.array(5)),
+    *([], [[1], [1, 2]], {}, {1: 2}, {"": 1}, {"a": {}}, {2}, range(3), object(), int, ...),
+    *(np.array([60]), np.array(["a"]), np.zeros((0, 3)), np.datetime64("2020-01-01")),
+)
+
+
+@pytest.mark.parametrize("cls", CLASSES, ids=attrgetter("__qualname__"))
+def test_odd_values_are_taken_or_refused_in_a_sentence(cls):
+    names = [one.name for one in fields(cls)]
+    required = {
+        one.name: NEEDED[one.name]
+        for one in fields(cls)
+        if one.default is MISSING is one.default_factory
+    }
+    makers = [lambda odd, name=name: cls(**{**required, name: odd}) for name in names]
+    refusals = []
+    for make, odd in product((*makers, cls.from_dict), ODD):
+        with suppress(AntsError):
+            make(odd)
+            continue
+        refusals.append(odd)
+    assert refusals
+
+
+def test_cells_can_be_an_array():
+    assert Clear(np.array([60])) == Clear([60])
 
 
 @dataclass(frozen=True)
@@ -194,6 +242,8 @@ def test_the_page_of_settings_is_made_from_the_declarations():
     page = (ROOT / "docs" / "settings.md").read_text()
     for kind in KINDS:
         assert table(kind) in page
+    for rule in RULES.built_in.values():
+        assert {*table(rule.settings).splitlines()} <= {*page.splitlines()}
     for name in learners.names():
         if declared(learners.get(name).hyperparameters):
             assert table(learners.get(name).hyperparameters) in page

@@ -91,7 +91,7 @@ def measure(seeds):
     title = "Double bridge: colonies by their use of the short branch"
     caption = f"{len(seeds)} colonies of {ANTS} ants in each panel, last tenth of {TICKS} ticks."
     panels = len(MODELS), len(BRIDGES)
-    return model_script.Results(numbers, summary, title, draw, caption, panels, height=4.4)
+    return model_script.ScriptResults(numbers, summary, title, draw, caption, panels, height=4.4)
 
 
 if __name__ == "__main__":

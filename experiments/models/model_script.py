@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Rows = list[dict[str, Any]]
 
 
-class Results(NamedTuple):
+class ScriptResults(NamedTuple):
     """The results of a script: the rows of its CSV file and of its table, and its figure.
 
     A row of the table has the condition of a seed, then measures. `draw` draws on the axes of the
@@ -42,7 +42,7 @@ def run(
     """Run a script, the path of a file, with the options --seeds and --out.
 
     It writes NAME.csv and NAME.png, where NAME is that of the script, and prints a table of means
-    over seeds with 95 % intervals. `measure` returns `Results` of a list of seeds.
+    over seeds with 95 % intervals. `measure` returns `ScriptResults` of a list of seeds.
     """
     name, parser = Path(script).stem, Parser(doc)
     parser.add_argument("--seeds", type=whole_number(1), default=seeds, help="number of seeds")
@@ -51,7 +51,7 @@ def run(
 
     def main() -> None:
         folder = files.check_writable_file(options.out / f"{name}.csv").parent
-        found = Results(*measure(list(range(options.seeds))))
+        found = ScriptResults(*measure(list(range(options.seeds))))
         files.write_csv(folder / f"{name}.csv", found.numbers, list(found.numbers[0]))
         print(table(found.summary))
         with style.styled():

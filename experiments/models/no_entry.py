@@ -143,7 +143,7 @@ def deliveries_over_time(
     return np.transpose(counts)
 
 
-def measure(seeds: list[int]) -> model_script.Results:
+def measure(seeds: list[int]) -> model_script.ScriptResults:
     """Return the deliveries over time for each model, and their differences to the first."""
     numbers, summary, found = [], [], {}
     for half_life in HALF_LIVES:
@@ -164,7 +164,7 @@ def measure(seeds: list[int]) -> model_script.Results:
         axes.set(xlabel="tick", ylabel="food items delivered", ylim=(0, None))
 
     title = "Deliveries on a decision tree, by where a no-entry pheromone is laid"
-    return model_script.Results(numbers, summary, title, draw)
+    return model_script.ScriptResults(numbers, summary, title, draw)
 
 
 if __name__ == "__main__":

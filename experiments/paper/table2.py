@@ -25,7 +25,7 @@ _GREEDY = ("greedy_return", "greedy_steps", "greedy_deliveries")
 _MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", *_GREEDY)
 
 
-class Summary(NamedTuple):
+class SummaryRow(NamedTuple):
     """A row of summary.csv: a configuration over all seeds."""
 
     row: Row
@@ -48,12 +48,12 @@ class Summary(NamedTuple):
         }
 
 
-def summarise(comparison: Comparison) -> list[Summary]:
+def summarise(comparison: Comparison) -> list[SummaryRow]:
     """Return a summary of each configuration, in the order of the rows."""
     values = {name: comparison.measures[name] for name in _MEASURES}
     estimates = centres_of(values, [name for name in values if LONE[name].uses_iqm])
     rows = zip(comparison.rows, estimates, comparison.behaviours, strict=True)
-    return [Summary(row, len(done), found, counts(done)) for row, found, done in rows]
+    return [SummaryRow(row, len(done), found, counts(done)) for row, found, done in rows]
 
 
 def summarise_behaviours(comparison: Comparison) -> list[dict[str, Any]]:
@@ -121,7 +121,7 @@ def best_run(values: np.ndarray, paper: float = math.nan) -> dict[str, float]:
 class Line(NamedTuple):
     """A row of table2.csv: a learner in one delivery setting."""
 
-    summary: Summary  # of the configuration that `shown_position` chooses
+    summary: SummaryRow  # of the configuration that `shown_position` chooses
     paper: PaperRow | None  # None without one, and in other worlds
     best_run_of: int  # number of configurations
     best_run: Mapping[str, Mapping[str, float]]  # by the names of `FIGURES`, see `best_run`
@@ -161,7 +161,9 @@ class Line(NamedTuple):
         }
 
 
-def table2(comparison: Comparison, summaries: Sequence[Summary], draws: int = DRAWS) -> list[Line]:
+def table2(
+    comparison: Comparison, summaries: Sequence[SummaryRow], draws: int = DRAWS
+) -> list[Line]:
     """Return a line for each delivery setting and learner, from `summarise`."""
     lines = []
     for learner in comparison.learners:

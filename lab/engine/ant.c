@@ -1,26 +1,42 @@
-/* Ants that learn, in plain C, one run after another, for comparison in throughput.py.
+/* Ants that learn, in C without vector instructions, for comparison in throughput.py.
  *
- * The program has branches, as one would write it by hand; for the rules, see ant.h. Several
- * threads take one run after another.
+ * For the rules, see ant.h. The program takes four runs together: all of them act, and then all of
+ * them learn. A step is a chain of operations, each of which needs the result of the one before.
+ * With four chains, the processor has something to do while one of them waits. There are hardly any
+ * branches, since nothing could predict which action an ant takes: a table has the effect of each
+ * action in each state, and masks select between values. Each state stores its largest action value
+ * and the actions that have it, except with Dyna-Q, which updates many more values than ants read.
  */
 #include <stdlib.h>
 #include <string.h>
 
 #include "ant.h"
+#ifdef __wasm_simd128__
+#include <wasm_simd128.h>
+#endif
 
-enum { N_PAIRS = N_STATES * N_ACTIONS };
+enum { TOGETHER = 4, N_PAIRS = N_STATES * N_ACTIONS, ROW = 8 };
+/* A cell has its level + 1 above four bits if it is empty, else its ground in these bits. */
+enum { LEVEL_AT = 4, NO_LEVEL = 1 << LEVEL_AT };
+/* Bits in the effect of an action; above them is the reward + 1 of one that exchanges no food. */
+enum { ENTERS = 1, EXCHANGES = 2, REWARD_AT = 2 };
 
+#define INLINE static inline __attribute__((always_inline))
+#define LEVEL(level) (((level) + 1) * NO_LEVEL)
+
+/* A set of actions is a list: from the lowest bit, three bits for its length and for each action. */
+enum { ALL_ACTIONS = N_ACTIONS | FORWARD << 6 | RIGHT << 9 | PICK_UP << 12 | GIVE << 15 };
+
+/* A state's action values, the largest of them, and the list of actions that have it. */
 typedef struct {
-    int cell, heading, carries, delivered;
-    uint64_t random;
-    uint8_t *ground;
-    int32_t *trail;
-} Ant;
+    float values[N_ACTIONS], best;
+    uint32_t choices, unused;
+} Row;
 
 /* The last transition of a pair of state and action. */
 typedef struct {
-    int32_t pair, next; /* indices in the table */
-    float reward, discount;
+    int16_t value, next; /* the place of the pair in the table, and the next state */
+    int16_t reward, terminated;
 } Transition;
 
 /* The transitions of all visited pairs, in the order of first visits. */
@@ -30,170 +46,317 @@ typedef struct {
     Transition transitions[N_PAIRS];
 } Model;
 
-/* The cell in view at position 0 (left), 1 (forward) or 2 (right). */
-static int in_view(const World *world, const Ant *ant, int position)
-{
-    return ant->cell + world->offsets[ant->heading + position];
-}
+/* An ant in one of the runs, and the step that it takes. */
+typedef struct {
+    uint64_t random, explore_below;
+    float learning_rate, discount;
+    int32_t cell, heading, carries, state, step, sum;
+    int32_t action, taken, reward, delivered, next; /* `action`: that of the next step, for SARSA */
+    int32_t *cells;
+    int32_t number, episode;
+    Run run;
+    Row rows[N_STATES];
+    Model model;
+} Ant;
 
-static int observe(const World *world, const Ant *ant)
+/* What all runs share. */
+typedef struct {
+    const World *world;
+    const Job *job;
+    const Run *runs;
+    int32_t *cells;                       /* (size) at the start of an episode */
+    uint8_t *lures;                       /* (size, 8) by heading: bits of a state, see `observe` */
+    uint8_t effects[N_STATES * ROW];      /* by state and action */
+    uint32_t choices[1 << N_ACTIONS];     /* the list of each set of actions, by its bits */
+    int32_t taken;                        /* runs that have begun */
+} Shared;
+
+static void tabulate(Shared *shared)
 {
-    int state = ant->carries;
-    if (ant->carries) {
-        int nearer = world->closer[ant->cell];
-        nearer |= nearer << N_HEADINGS | nearer << 2 * N_HEADINGS; /* headings are cyclic */
-        nearer >>= ant->heading + N_HEADINGS - 1;
-        for (int k = 0; k < 3; k++) {
-            int ground = ant->ground[in_view(world, ant, k)];
-            int lure = (ground == 0) & (nearer >> k);
-            state = state << 2 | (lure ? SEES_CUE : ground >> 2);
+    const World *world = shared->world;
+    for (int c = 0; c < world->size; c++) {
+        shared->cells[c] = world->ground[c] ? world->ground[c] : LEVEL(world->trail[c]);
+        for (int h = 0; h < N_HEADINGS; h++) {
+            int nearer = world->closer[c]; /* repeated, because headings are cyclic */
+            nearer |= nearer << N_HEADINGS | nearer << 2 * N_HEADINGS;
+            nearer >>= h + N_HEADINGS - 1;
+            int lures = (nearer & 1) << 5 | (nearer & 2) << 2 | (nearer & 4) >> 1;
+            shared->lures[8 * c + h] = (uint8_t)lures;
         }
-        return state;
     }
-    int grounds[3], levels[3], strongest = 2;
-    for (int k = 0; k < 3; k++) {
-        int cell = in_view(world, ant, k);
-        grounds[k] = ant->ground[cell];
-        levels[k] = ant->trail[cell] & -(grounds[k] == 0); /* no branch */
-        strongest = levels[k] > strongest ? levels[k] : strongest;
+    for (int state = 0; state < N_STATES; state++)
+        for (int action = 0; action < N_ACTIONS; action++) {
+            int code = state << 2 * action >> 4 & 3, sees_goal = (state & state >> 1 & 21) != 0;
+            int enters = action <= RIGHT && !(code & 1), reward = enters ? code == SEES_CUE : -1;
+            int exchanges = sees_goal && action == PICK_UP + (state >> 6);
+            int effect = enters * ENTERS | exchanges * EXCHANGES | (reward + 1) << REWARD_AT;
+            shared->effects[ROW * state + action] = (uint8_t)effect;
+        }
+    for (uint32_t set = 0; set < 1 << N_ACTIONS; set++) {
+        uint32_t list = 0, n = 0;
+        for (uint32_t action = 0; action < N_ACTIONS; action++)
+            if (set >> action & 1)
+                list |= action << 3 * ++n;
+        shared->choices[set] = list | n;
     }
-    for (int k = 0; k < 3; k++)
-        state = state << 2 | (2 * levels[k] >= strongest ? SEES_CUE : grounds[k] & 3);
-    return state;
 }
 
-static int act(const World *world, Ant *ant, int state, int action)
+INLINE int larger_of(int a, int b) { return a > b ? a : b; }
+
+INLINE int observe(const Shared *shared, const Ant *ant)
 {
-    if (action <= RIGHT) {
-        int code = state >> (4 - 2 * action) & 3;
-        int target = in_view(world, ant, action);
-        if (action != FORWARD)
-            ant->heading = (ant->heading + action + N_HEADINGS - 1) % N_HEADINGS;
-        if (code & 1)
-            return -1;
-        ant->cell = target;
-        if (ant->carries)
-            ant->trail[target] = DEPOSIT;
-        return code == SEES_CUE;
-    }
+    const int32_t *at = ant->cells + ant->cell, *steps = shared->world->offsets + ant->heading;
+    int left = at[steps[LEFT]], forward = at[steps[FORWARD]], right = at[steps[RIGHT]];
+    /* A cue is a cell with at least half of the strongest level, or, with food, any empty cell. */
+    int most = larger_of(larger_of(left, forward), larger_of(right, LEVEL(2))) + NO_LEVEL - 1;
+    most = ant->carries ? 2 * NO_LEVEL - 1 : most;
+    int cues = (2 * left > most) << 5 | (2 * forward > most) << 3 | (2 * right > most) << 1;
+    /* With food, only if it is nearer to the queen. */
+    int allowed = shared->lures[8 * ant->cell + ant->heading] | ((ant->carries - 1) & 42);
+    int shift = 2 * ant->carries; /* to the code of a ground for carriers */
+    int codes = (left >> shift & 3) << 4 | (forward >> shift & 3) << 2 | (right >> shift & 3);
+    return ant->carries << 6 | codes | (cues & allowed);
+}
+
+static void pick_up(const Shared *shared, Ant *ant)
+{
     int goals[3], n = 0;
     for (int k = 0; k < 3; k++)
-        if ((state >> (4 - 2 * k) & 3) == SEES_GOAL)
+        if ((ant->state >> (4 - 2 * k) & 3) == SEES_GOAL)
             goals[n++] = k;
-    if (n == 0 || (action == GIVE) != ant->carries)
-        return -1;
-    if (action == GIVE) {
-        ant->carries = 0;
-        ant->delivered = 1;
-        return 10;
-    }
-    int food = in_view(world, ant, goals[n > 1 ? below(draw(&ant->random) >> 32, n) : 0]);
-    ant->ground[food] = 0;
-    ant->trail[food] = ant->trail[ant->cell] = DEPOSIT;
+    int position = goals[n > 1 ? below(draw(&ant->random) >> 32, n) : 0];
+    ant->cells[ant->cell + shared->world->offsets[ant->heading + position]] = LEVEL(DEPOSIT);
+    ant->cells[ant->cell] = LEVEL(DEPOSIT);
     ant->heading = (ant->heading + 3) % N_HEADINGS;
-    ant->carries = 1;
-    return 3;
 }
 
-static float larger(float a, float b) { return a > b ? a : b; }
-static float best_of(const float *v)
+INLINE void act(const Shared *shared, Ant *ant)
+{
+    static const int8_t turned[N_ACTIONS][8] = {{5, 0, 1, 2, 3, 4}, {0, 1, 2, 3, 4, 5},
+                                                {1, 2, 3, 4, 5, 0}, {0, 1, 2, 3, 4, 5},
+                                                {0, 1, 2, 3, 4, 5}};
+    int action = ant->taken, effect = shared->effects[ROW * ant->state + action];
+    if (effect & EXCHANGES) { /* rare */
+        ant->delivered = ant->carries;
+        ant->reward = ant->carries ? 10 : 3;
+        if (!ant->carries)
+            pick_up(shared, ant);
+        ant->carries ^= 1;
+        return;
+    }
+    int enters = effect & ENTERS;
+    int cell = ant->cell + (shared->world->offsets[ant->heading + action] & -enters);
+    ant->heading = turned[action][ant->heading];
+    ant->cell = cell;
+    ant->delivered = 0;
+    ant->reward = (effect >> REWARD_AT) - 1;
+    if (enters & ant->carries)
+        ant->cells[cell] = LEVEL(DEPOSIT);
+}
+
+#ifdef __wasm_simd128__ /* where a selection between floats is slow */
+INLINE float best_of(const float *v)
+{
+    v128_t best = wasm_f32x4_pmax(wasm_v128_load(v), wasm_v128_load(v + 1));
+    best = wasm_f32x4_pmax(best, wasm_i32x4_shuffle(best, best, 2, 3, 0, 1));
+    best = wasm_f32x4_pmax(best, wasm_i32x4_shuffle(best, best, 1, 0, 3, 2));
+    return wasm_f32x4_extract_lane(best, 0);
+}
+INLINE unsigned set_of(const float *v, float best)
+{
+    unsigned first = wasm_i32x4_bitmask(wasm_f32x4_eq(wasm_v128_load(v), wasm_f32x4_splat(best)));
+    return first | (unsigned)(v[GIVE] == best) << GIVE;
+}
+#else
+INLINE float larger(float a, float b) { return a > b ? a : b; }
+INLINE float best_of(const float *v)
 {
     return larger(larger(larger(v[0], v[1]), larger(v[2], v[3])), v[4]);
 }
-static int choose(const float *values, uint64_t bits, uint64_t explore_below)
+INLINE unsigned set_of(const float *v, float best)
 {
-    if (bits >> 32 < explore_below)
-        return below(bits & 0xFFFFFFFFu, N_ACTIONS);
-    float best = best_of(values);
-    int mask = 0, skipped = 0;
-    for (int a = 0; a < N_ACTIONS; a++)
-        mask |= (values[a] == best) << a;
-    if (mask & (mask - 1))
-        skipped = below(bits & 0xFFFFFFFFu, __builtin_popcount((unsigned)mask));
-    for (; skipped > 0; skipped--)
-        mask &= mask - 1;
-    return __builtin_ctz((unsigned)mask);
+    unsigned set = 0;
+    for (int action = 0; action < N_ACTIONS; action++)
+        set |= (unsigned)(v[action] >= best) << action;
+    return set;
+}
+#endif
+
+INLINE void note_best(const Shared *shared, Row *row)
+{
+    row->best = best_of(row->values);
+    row->choices = shared->choices[set_of(row->values, row->best)];
 }
 
-static void update(float *q, Transition seen, float next_value, float learning_rate)
+INLINE int choose(const Row *row, Ant *ant)
 {
-    float error = seen.reward + seen.discount * next_value - q[seen.pair];
-    q[seen.pair] += learning_rate * error;
+    uint64_t bits = draw(&ant->random);
+    /* All bits are set if the ant explores: a difference that is negative, shifted. */
+    uint32_t explores = (uint32_t)((int64_t)((bits >> 32) - ant->explore_below) >> 63);
+    uint32_t choices = row->choices ^ ((row->choices ^ ALL_ACTIONS) & explores);
+    int k = below(bits & 0xFFFFFFFFu, choices & 7);
+    return choices >> (3 * k + 3) & 7;
 }
 
-static void plan(float *q, Model *model, Transition seen, int steps, float learning_rate,
-                 uint64_t *random)
+INLINE void update(Ant *ant, float *value, int reward, int terminated, float next_value)
 {
-    if (model->place[seen.pair] == 0)
-        model->place[seen.pair] = (int16_t)++model->n;
-    model->transitions[model->place[seen.pair] - 1] = seen;
+    float discount = terminated ? 0.0f : ant->discount;
+    float error = (float)reward + discount * next_value - *value;
+    *value += ant->learning_rate * error;
+}
+
+INLINE void plan(Ant *ant, int action, int terminated, int steps)
+{
+    Model *model = &ant->model;
+    int pair = N_ACTIONS * ant->state + action;
+    if (model->place[pair] == 0)
+        model->place[pair] = (int16_t)++model->n;
+    Transition seen = {(int16_t)(ROW * ant->state + action), (int16_t)ant->next,
+                       (int16_t)ant->reward, (int16_t)terminated};
+    model->transitions[model->place[pair] - 1] = seen;
     for (int k = 0; k < steps; k++) {
-        Transition drawn = model->transitions[below(draw(random) >> 32, model->n)];
-        update(q, drawn, best_of(q + drawn.next), learning_rate);
+        seen = model->transitions[below(draw(&ant->random) >> 32, model->n)];
+        float next_value = best_of(ant->rows[seen.next].values);
+        update(ant, (float *)ant->rows + seen.value, seen.reward, seen.terminated, next_value);
     }
 }
 
-/* Do one run of a learner that is known at compile time; return 0 if out of memory. */
-static inline __attribute__((always_inline)) int train_run(const World *world, const Job *job,
-                                                           int number, Run run, int learner)
+/* The first half of a step: choose, act and observe. */
+INLINE void move(const Shared *shared, Ant *ant, int learner)
 {
-    float *q = job->q + (size_t)number * N_PAIRS;
-    Ant ant = {.random = run.random};
-    Model *model = learner == DYNA_Q ? calloc(1, sizeof(Model)) : NULL;
-    ant.ground = malloc((size_t)world->size);
-    ant.trail = malloc((size_t)world->size * sizeof(int32_t));
-    int enough = ant.ground != NULL && ant.trail != NULL && (learner != DYNA_Q || model != NULL);
-    for (int episode = 0; episode < job->episodes && enough; episode++) {
-        memcpy(ant.ground, world->ground, (size_t)world->size);
-        memcpy(ant.trail, world->trail, (size_t)world->size * sizeof(int32_t));
-        ant.cell = run.cell;
-        ant.heading = run.heading;
-        ant.carries = ant.delivered = 0;
-        uint64_t explore_below = (uint64_t)(run.epsilon * 4294967296.0);
-        int state = observe(world, &ant), step = 0, sum = 0, next_action = 0;
-        if (learner == SARSA)
-            next_action = choose(q + state * N_ACTIONS, draw(&ant.random), explore_below);
-        for (; step < job->max_steps && !ant.delivered; step++) {
-            int action = next_action;
-            if (learner != SARSA)
-                action = choose(q + state * N_ACTIONS, draw(&ant.random), explore_below);
-            int reward = act(world, &ant, state, action);
-            int next = observe(world, &ant), terminated = ant.delivered && !job->delivery_truncates;
-            const float *values = q + next * N_ACTIONS;
-            if (learner == SARSA && !terminated)
-                next_action = choose(values, draw(&ant.random), explore_below);
-            Transition seen = {state * N_ACTIONS + action, next * N_ACTIONS, (float)reward,
-                            terminated ? 0.0f : run.discount};
-            float next_value = learner == SARSA ? values[next_action] : best_of(values);
-            update(q, seen, next_value, run.learning_rate);
-            if (learner == DYNA_Q)
-                plan(q, model, seen, job->planning_steps, run.learning_rate, &ant.random);
-            sum += reward;
-            state = next;
-        }
-        job->returns[(size_t)number * job->episodes + episode] = sum;
-        job->steps[(size_t)number * job->episodes + episode] = step;
-        double epsilon = run.epsilon * run.decay;
-        run.epsilon = epsilon > run.min_epsilon ? epsilon : run.min_epsilon;
-    }
-    free(model);
-    free(ant.ground);
-    free(ant.trail);
-    return enough;
+    Row *row = &ant->rows[ant->state];
+    if (learner == DYNA_Q)
+        note_best(shared, row);
+    ant->taken = learner == SARSA ? ant->action : choose(row, ant);
+    act(shared, ant);
+    ant->next = observe(shared, ant);
 }
 
-/* Train all runs; return 0 if out of memory. */
+/* The second half: learn; return whether the episode ends. */
+INLINE int learn(const Shared *shared, Ant *ant, int learner)
+{
+    const Job *job = shared->job;
+    Row *row = &ant->rows[ant->state], *next = &ant->rows[ant->next];
+    int terminated = ant->delivered & !job->delivery_truncates;
+    float next_value = learner == DYNA_Q ? best_of(next->values) : next->best;
+    if (learner == SARSA) {
+        if (!terminated)
+            ant->action = choose(next, ant);
+        next_value = next->values[ant->action];
+    }
+    update(ant, &row->values[ant->taken], ant->reward, terminated, next_value);
+    if (learner == DYNA_Q)
+        plan(ant, ant->taken, terminated, job->planning_steps);
+    else
+        note_best(shared, row);
+    ant->sum += ant->reward;
+    ant->state = ant->next;
+    ant->step++;
+    return ant->delivered | (ant->step >= job->max_steps);
+}
+
+INLINE void begin_episode(const Shared *shared, Ant *ant, int learner)
+{
+    memcpy(ant->cells, shared->cells, (size_t)shared->world->size * sizeof(int32_t));
+    ant->cell = ant->run.cell;
+    ant->heading = ant->run.heading;
+    ant->carries = ant->step = ant->sum = 0;
+    ant->explore_below = (uint64_t)(ant->run.epsilon * 4294967296.0);
+    ant->state = observe(shared, ant);
+    if (learner == SARSA)
+        ant->action = choose(&ant->rows[ant->state], ant);
+}
+
+/* Begin the next run; return 0 if there is none. */
+static inline int begin_run(Shared *shared, Ant *ant, int learner)
+{
+    int number;
+#pragma omp atomic capture
+    number = shared->taken++;
+    if (number >= shared->job->n)
+        return 0;
+    ant->number = number;
+    ant->episode = 0;
+    ant->run = shared->runs[number];
+    ant->random = ant->run.random;
+    ant->learning_rate = ant->run.learning_rate;
+    ant->discount = ant->run.discount;
+    ant->model.n = 0;
+    memset(ant->model.place, 0, sizeof ant->model.place);
+    const float *q = shared->job->q + (size_t)number * N_PAIRS;
+    for (int state = 0; state < N_STATES; state++) {
+        memcpy(ant->rows[state].values, q + N_ACTIONS * state, sizeof ant->rows[state].values);
+        note_best(shared, &ant->rows[state]);
+    }
+    begin_episode(shared, ant, learner);
+    return 1;
+}
+
+/* Write the results of an episode, and begin another one; return 0 if no run is left. */
+static inline int end_episode(Shared *shared, Ant *ant, int learner)
+{
+    const Job *job = shared->job;
+    size_t at = (size_t)ant->number * (size_t)job->episodes + (size_t)ant->episode++;
+    job->returns[at] = ant->sum;
+    job->steps[at] = ant->step;
+    if (job->deliveries)
+        job->deliveries[at] = ant->delivered;
+    double epsilon = ant->run.epsilon * ant->run.decay;
+    ant->run.epsilon = epsilon > ant->run.min_epsilon ? epsilon : ant->run.min_epsilon;
+    if (ant->episode < job->episodes) {
+        begin_episode(shared, ant, learner);
+        return 1;
+    }
+    float *q = job->q + (size_t)ant->number * N_PAIRS;
+    for (int state = 0; state < N_STATES; state++)
+        memcpy(q + N_ACTIONS * state, ant->rows[state].values, sizeof ant->rows[state].values);
+    return begin_run(shared, ant, learner);
+}
+
+/* Do runs until none is left, with a learner that is known at compile time. */
+INLINE void train_ants(Shared *shared, Ant *ants, int learner)
+{
+    Ant *active[TOGETHER];
+    int n = 0;
+    for (int k = 0; k < TOGETHER; k++)
+        if (begin_run(shared, &ants[k], learner))
+            active[n++] = &ants[k];
+    while (n > 0) {
+        for (int k = 0; k < n; k++)
+            move(shared, active[k], learner);
+        for (int k = 0; k < n; k++)
+            if (learn(shared, active[k], learner) && !end_episode(shared, active[k], learner))
+                active[k--] = active[--n];
+    }
+}
+
+/* Train all runs; return 0 if out of memory. Levels of trails are below 2 ** 26. */
 int train(const World *world, const Job *job, const Run *runs)
 {
-    int enough = 1;
-#pragma omp parallel for schedule(dynamic) num_threads(job->threads) reduction(&& : enough)
-    for (int i = 0; i < job->n; i++) {
-        if (job->learner == Q_LEARNING)
-            enough = train_run(world, job, i, runs[i], Q_LEARNING) && enough;
-        else if (job->learner == SARSA)
-            enough = train_run(world, job, i, runs[i], SARSA) && enough;
-        else
-            enough = train_run(world, job, i, runs[i], DYNA_Q) && enough;
+    Shared shared = {.world = world, .job = job, .runs = runs};
+    size_t size = (size_t)world->size;
+    shared.cells = malloc(size * sizeof(int32_t));
+    shared.lures = calloc(size, 8);
+    int enough = shared.cells != NULL && shared.lures != NULL;
+    if (enough)
+        tabulate(&shared);
+#pragma omp parallel num_threads(job->threads) reduction(&& : enough)
+    {
+        Ant *ants = malloc(TOGETHER * sizeof(Ant));
+        int32_t *cells = malloc(TOGETHER * size * sizeof(int32_t));
+        enough = shared.cells != NULL && shared.lures != NULL && ants != NULL && cells != NULL;
+        for (int k = 0; k < TOGETHER && enough; k++)
+            ants[k].cells = cells + (size_t)k * size;
+        if (enough && job->learner == Q_LEARNING)
+            train_ants(&shared, ants, Q_LEARNING);
+        else if (enough && job->learner == SARSA)
+            train_ants(&shared, ants, SARSA);
+        else if (enough)
+            train_ants(&shared, ants, DYNA_Q);
+        free(ants);
+        free(cells);
     }
+    free(shared.cells);
+    free(shared.lures);
     return enough;
 }

@@ -34,6 +34,7 @@ typedef struct {
     float *q;         /* (n, 128, 5), the initial values */
     int32_t *returns; /* (n, episodes) */
     int32_t *steps;   /* (n, episodes) */
+    int32_t *deliveries; /* (n, episodes), or NULL */
 } Job;
 
 static inline uint64_t draw(uint64_t *state)

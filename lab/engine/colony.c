@@ -1,9 +1,10 @@
-/* A colony of ants that share one table, in C, for comparison in colony_in_c.py.
+/* A colony of ants that share one table, in C, for the lab (page.c) and for the comparison in
+ * benchmarks/colony_in_c.py.
  *
  * The rules, random numbers and arithmetic are those of the package (taichi_ants/engines/colony),
- * for two of its tasks: the paper's and foraging(). Results are equal to the bit if the compiler
- * does not fuse multiplications and additions (-ffp-contract=off). With OpenMP, several threads
- * share each tick.
+ * for a few of its tasks: the paper's, queueing(), and foraging() with any of its three parts.
+ * Results are equal to the bit if the compiler does not fuse multiplications and additions
+ * (-ffp-contract=off). With OpenMP, several threads share each tick.
  *
  * The ants are an array of small structs, sorted by cell from time to time. A cell has one byte for
  * its content and one for what its ant wants, so that a conflict reads all neighbours of a cell in
@@ -24,8 +25,25 @@ static int omp_get_num_threads(void) { return 1; }
 #ifdef __AVX2__
 #include <immintrin.h>
 #endif
+#ifdef __wasm_simd128__
+#include <wasm_simd128.h>
+#endif
 
-enum { EMPTY = 0, OBSTACLE = 5, QUEEN = 13 };
+/* The rules of a task and its learner, as bits. They are constants of the functions below, so that
+ * the compiler makes a loop for each usual set of rules. */
+enum {
+    DIRECTED = 1,  /* trails rise towards food, and ants see only the strongest */
+    SWAPS = 2,     /* ants with food push others aside */
+    SEES_ANTS = 4, /* ants see each other */
+    QUEUES = 8,    /* ants of a queue move at once; an ant sees which one to follow */
+    SARSA = 16,    /* ants learn by SARSA instead of Q-learning */
+    FROZEN = 32,   /* ants do not learn */
+    PAPERS = 0,
+    FORAGING = DIRECTED | SWAPS | SEES_ANTS,
+    QUEUEING = FORAGING | QUEUES
+};
+
+enum { EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13 };
 enum { LEFT, FORWARD, RIGHT, PICK_UP, GIVE, N_ACTIONS };
 enum { ENTERED_EMPTY, FAILED, ENTERED_CUE, PICKED_UP, DELIVERED };
 enum { SEES_CUE = 2, ROW = 8, N_HEADINGS = 6 };
@@ -53,13 +71,19 @@ typedef struct {
     const float *weights;   /* (n + 1) */
     const int32_t *rewards; /* (5) in the order of the fields of Rewards, as events are here */
     int64_t counts[4];      /* the results: returns, deliveries, moves, blocked */
+    int32_t regrowth;       /* ticks until food is back; only read if there are `sources` */
+    int32_t sources;        /* number of food sources */
+    int32_t *source_at;     /* (sources) their cells */
+    int32_t *taken;         /* (size) the tick in which food of a source was taken, or -1 */
 } Colony;
 
 typedef struct {
     uint64_t random;
     int32_t cell, carried;
     uint16_t state;
-    uint8_t heading, carries, percept, action, want, event;
+    uint8_t heading, carries, percept, action;
+    uint8_t want; /* under SARSA between two ticks: 1 plus the next action, or 0 */
+    uint8_t event;
 } Ant;
 
 /* The largest value of a state, and a bit for each action that has it. */
@@ -77,7 +101,9 @@ typedef struct {
 
 typedef struct {
     Ant *ants;      /* (n) */
-    uint8_t *wants; /* (size) */
+    Ant *spare;     /* (n) room to sort the ants; NULL if they must keep their places */
+    int *places;
+    uint8_t *wants; /* (size), with room for a row of cells before and after it */
     Greedy *greedy; /* (states) */
     Errors *errors[MOST_THREADS]; /* of each thread, (states * ROW) */
     int32_t *pairs[MOST_THREADS]; /* the pairs with errors: their number, then the pairs */
@@ -136,6 +162,14 @@ INLINE Greedy greedy_of(const float *row)
     best = _mm_max_ss(best, _mm_movehdup_ps(best));
     __m256 equal = _mm256_cmp_ps(values, _mm256_broadcastss_ps(best), _CMP_EQ_OQ);
     return (Greedy){_mm_cvtss_f32(best), (uint32_t)_mm256_movemask_ps(equal)};
+#elif defined(__wasm_simd128__)
+    v128_t low = wasm_v128_load(row), high = wasm_v128_load(row + 4);
+    v128_t best = wasm_f32x4_pmax(low, high); /* of two numbers, `a < b ? b : a` */
+    best = wasm_f32x4_pmax(best, wasm_i32x4_shuffle(best, best, 2, 3, 0, 1));
+    best = wasm_f32x4_pmax(best, wasm_i32x4_shuffle(best, best, 1, 0, 3, 2));
+    unsigned equal = wasm_i32x4_bitmask(wasm_f32x4_eq(low, best));
+    equal |= wasm_i32x4_bitmask(wasm_f32x4_eq(high, best)) << 4;
+    return (Greedy){wasm_f32x4_extract_lane(best, 0), equal};
 #else
     Greedy greedy = {row[0], 0};
     for (int a = 1; a < N_ACTIONS; a++)
@@ -159,20 +193,21 @@ INLINE int level_of(const Colony *c, int cell, int clock)
     return level > 0 ? level : 0;
 }
 
-/* The percept of an ant, and under the rules of foraging the row of its table. */
-INLINE int see(const Colony *c, int foraging, int cell, int heading, int carries, int clock, int *row)
+/* The percept of an ant, and if it sees ants the row of its table, which is the percept if not. */
+INLINE int see(const Colony *c, int rules, int cell, int heading, int carries, int clock, int *row)
 {
     int codes[3], levels[3] = {0}, ants[3], nearer, strongest;
     nearer = c->closer[cell];
     nearer = (nearer | nearer << 6 | nearer << 12) >> (heading + 5);
-    strongest = foraging ? 1 : 2;
+    strongest = rules & DIRECTED ? 1 : 2;
     for (int k = 0; k < 3; k++) {
         int place = cell + c->steps[heading + k];
         codes[k] = c->ground[place] & 15;
         ants[k] = c->ground[place] >> ANT_SHIFT;
-        if (foraging || !carries) {
+        if ((rules & SEES_ANTS) || !carries) {
             levels[k] = level_of(c, place, clock);
-            int visible = codes[k] == EMPTY ? levels[k] : 0;
+            int counts = codes[k] == EMPTY || ((rules & QUEUES) && ants[k] == 2);
+            int visible = counts ? levels[k] : 0;
             strongest = visible > strongest ? visible : strongest;
         }
     }
@@ -181,27 +216,30 @@ INLINE int see(const Colony *c, int foraging, int cell, int heading, int carries
             codes[k] = codes[k] == EMPTY && nearer >> k & 1 ? SEES_CUE : codes[k] >> 2;
         } else {
             int visible = codes[k] == EMPTY ? levels[k] : 0;
-            int lures = foraging ? visible >= strongest : 2 * visible >= strongest;
-            codes[k] = lures ? SEES_CUE : codes[k] & 3;
+            int shows = rules & DIRECTED ? visible >= strongest : 2 * visible >= strongest;
+            codes[k] = shows ? SEES_CUE : codes[k] & 3;
         }
     }
-    if (foraging) {
+    int percept = carries << 6 | codes[0] << 4 | codes[1] << 2 | codes[2];
+    if (rules & SEES_ANTS) {
         int index = carries, own = level_of(c, cell, clock);
         for (int k = 0; k < 3; k++) {
             int better = carries ? nearer >> k & 1 : levels[k] > own;
             int code = ants[k] == 2 - carries ? (better ? 4 : 5) : codes[k];
-            index = 6 * index + code;
+            if ((rules & QUEUES) && ants[k] == 1 + carries && better)
+                code = 6;
+            index = (rules & QUEUES ? 7 : 6) * index + code;
         }
         *row = index;
     }
-    return carries << 6 | codes[0] << 4 | codes[1] << 2 | codes[2];
+    return percept;
 }
 
 /* The new value of a cell in `trail`. */
-INLINE int after_deposit(const Colony *c, int foraging, int cell, int clock, int carried)
+INLINE int after_deposit(const Colony *c, int rules, int cell, int clock, int carried)
 {
     int laid = c->level;
-    if (foraging) {
+    if (rules & DIRECTED) {
         laid -= c->slope * (carried < c->fades_after ? carried : c->fades_after);
         int before = level_of(c, cell, clock);
         laid = before > laid ? before : laid;
@@ -209,16 +247,28 @@ INLINE int after_deposit(const Colony *c, int foraging, int cell, int clock, int
     return clock + laid;
 }
 
-INLINE void choose_and_want(const Colony *c, const Work *w, int foraging, Ant *ant)
+/* Whether ants can enter cells with ants. */
+INLINE int shares_cells(int rules) { return (rules & (SWAPS | QUEUES)) != 0; }
+
+INLINE int state_of(int rules, const Ant *ant)
 {
-    int percept = ant->percept, row = foraging ? ant->state : percept;
-    uint64_t random = advance(ant->random);
-    int action = choose(w->greedy[row].actions, bits_of(random), c->explore_below);
+    return rules & SEES_ANTS ? ant->state : ant->percept;
+}
+
+INLINE void choose_and_want(const Colony *c, const Work *w, int rules, Ant *ant)
+{
+    int percept = ant->percept, action = rules & SARSA ? ant->want - 1 : -1;
+    uint64_t random = ant->random;
+    if (action < 0) {
+        random = advance(random);
+        unsigned greedy = w->greedy[state_of(rules, ant)].actions;
+        action = choose(greedy, bits_of(random), c->explore_below);
+    }
     int cell = ant->cell, heading = turned(ant->heading, action);
-    int enters = !(code_in_view(percept, action) & 1);
-    if (foraging)
-        enters |= c->ground[cell + c->steps[heading + 1]] >> ANT_SHIFT;
-    int want = (enters & (action <= RIGHT)) ? ENTER + heading : foraging ? STANDS : 0;
+    int enters = !(code_in_view(percept, action) & 1), shared = shares_cells(rules);
+    if (shared)
+        enters |= c->ground[cell + c->steps[heading + 1]] >> ANT_SHIFT != 0;
+    int want = (enters & (action <= RIGHT)) ? ENTER + heading : shared ? STANDS : 0;
     int foods = goals_in_view(percept);
     if ((foods != 0) & (action == PICK_UP) & !ant->carries) {
         int k = 0;
@@ -227,13 +277,13 @@ INLINE void choose_and_want(const Colony *c, const Work *w, int foraging, Ant *a
             k = below(bits_of(random) >> 32, __builtin_popcount(foods));
         }
         int towards = heading + bit_number(foods, k) + N_HEADINGS - 1;
-        want = (TAKE + towards % N_HEADINGS) | (foraging ? TAKES_FOOD : 0);
+        want = (TAKE + towards % N_HEADINGS) | (shared ? TAKES_FOOD : 0);
     }
     ant->random = random;
     ant->heading = heading;
     ant->action = action;
     ant->want = want & MARK;
-    w->wants[cell] = want | (foraging ? ant->carries * HAS_FOOD : 0);
+    w->wants[cell] = want | (shared ? ant->carries * HAS_FOOD : 0);
 }
 
 INLINE int wanted_by(const Colony *c, int cell, int want)
@@ -266,56 +316,73 @@ INLINE uint64_t who_want(uint64_t marks, int bits, int mark)
     return ~(((other & EACH(127)) + EACH(127)) | other) & EACH(128);
 }
 
+/* `loads` are the bytes `wants` if ants with food precede others, else NULL. */
 static __attribute__((noinline)) int beats_rivals(
-    const int32_t *steps, uint64_t rivals, int cell, int wanted, int tick)
+    const int32_t *steps, const uint8_t *loads, uint64_t rivals, int cell, int wanted, int tick)
 {
     uint64_t own = bits_of(advance(bits_of(advance(cell)) ^ (uint64_t)tick));
     for (; rivals; rivals &= rivals - 1) {
         int other = wanted + steps[AROUND[__builtin_ctzll(rivals) >> 3] + 1];
-        if (other != cell && bits_of(advance(bits_of(advance(other)) ^ (uint64_t)tick)) <= own)
+        if (other == cell)
+            continue;
+        int before = loads ? (loads[other] & HAS_FOOD) - (loads[cell] & HAS_FOOD) : 0;
+        if (before == 0)
+            before = bits_of(advance(bits_of(advance(other)) ^ (uint64_t)tick)) <= own;
+        if (before > 0)
             return 0;
     }
     return 1;
 }
 
 /* Whether an ant wins: no other ant wants the same, or its key is the smallest. */
-INLINE int wins(const Colony *c, const Work *w, int cell, int want, int tick)
+INLINE int wins(const Colony *c, const Work *w, int rules, int cell, int want, int tick)
 {
     int wanted = wanted_by(c, cell, want);
+    const uint8_t *loads = rules & QUEUES ? w->wants : NULL;
     uint64_t rivals = who_want(around(c, w->wants, wanted), MARK, want & 8);
-    return !(rivals & (rivals - 1)) || beats_rivals(c->steps, rivals, cell, wanted, tick);
+    return !(rivals & (rivals - 1)) || beats_rivals(c->steps, loads, rivals, cell, wanted, tick);
 }
 
 INLINE int claims(int want) { return want != 0 && want != STANDS; }
 
-/* The heading towards the carrier that wins the cell of another ant, -1 if none does. */
-INLINE int pushed_towards(const Colony *c, const Work *w, int cell)
+/* The heading towards the ant that wins a cell and has all these `bits`, -1 if there is none. */
+INLINE int entered_from(const Colony *c, const Work *w, int cell, int bits)
 {
-    const int bits = WINS | HAS_FOOD;
     uint64_t found = who_want(around(c, w->wants, cell), MARK | bits, bits);
     return found ? AROUND[__builtin_ctzll(found) >> 3] : -1;
 }
 
-INLINE int gives_way(const Colony *c, const Work *w, int cell)
+/* Whether the ant on a cell lets an ant with food pass; in queues, only asked of ants that stay. */
+INLINE int gives_way(const Colony *c, const Work *w, int rules, int cell)
 {
     int mark = w->wants[cell];
     if (mark & (HAS_FOOD | TAKES_FOOD))
         return 0;
-    return !(mark & WINS) || w->wants[wanted_by(c, cell, mark & MARK)];
+    return (rules & QUEUES) || !(mark & WINS) || w->wants[wanted_by(c, cell, mark & MARK)];
 }
 
-/* Under the rules of foraging: mark winners, and judge whether a cell with an ant shows a cue. */
-INLINE void resolve(const Colony *c, const Work *w, Ant *ant, int tick, int clock)
+/* Whether a winner finds the cell `ahead` empty. A queue moves if its first ant does; a ring does
+ * not move. */
+INLINE int way_is_free(const Colony *c, const Work *w, int rules, int cell, int ahead)
+{
+    if (rules & QUEUES)
+        while (ahead != cell && (w->wants[ahead] & (WINS | TAKES_FOOD)) == WINS)
+            ahead = wanted_by(c, ahead, w->wants[ahead] & MARK);
+    return !w->wants[ahead];
+}
+
+/* Where ants share cells: mark winners, and judge whether a cell with an ant shows a cue. */
+INLINE void resolve(const Colony *c, const Work *w, int rules, Ant *ant, int tick, int clock)
 {
     int cell = ant->cell, want = ant->want;
     if (!claims(want))
         return;
-    if (!wins(c, w, cell, want, tick)) {
+    int won = wins(c, w, rules, cell, want, tick);
+    if (won)
+        w->wants[cell] |= WINS;
+    else
         ant->want = STANDS;
-        return;
-    }
-    w->wants[cell] |= WINS;
-    if (want < TAKE) {
+    if (want < TAKE && (won || (rules & QUEUES))) { /* in a queue, an ant can be pushed there */
         int ahead = wanted_by(c, cell, want);
         int code = code_in_view(ant->percept, ant->action);
         if (w->wants[ahead]) {
@@ -327,17 +394,19 @@ INLINE void resolve(const Colony *c, const Work *w, Ant *ant, int tick, int cloc
     }
 }
 
-INLINE void act(const Colony *c, const Work *w, int foraging, Ant *ant, int tick, int clock,
+INLINE void act(const Colony *c, const Work *w, int rules, Ant *ant, int tick, int clock,
                 int64_t *counts)
 {
     int cell = ant->cell, want = ant->want, action = ant->action, carries = ant->carries;
     int wanted = wanted_by(c, cell, want), claim = claims(want), event = FAILED, goes = cell;
     int moves = action <= RIGHT, filled = 0, came = 0;
-    if (foraging) {
+    if (shares_cells(rules)) {
         int enters = 0;
         if (moves && claim) {
-            enters = !w->wants[wanted];
-            if (!enters && carries && gives_way(c, w, wanted))
+            enters = way_is_free(c, w, rules, cell, wanted);
+            if (rules & QUEUES)
+                filled = enters && entered_from(c, w, cell, WINS) >= 0;
+            if (!enters && carries && gives_way(c, w, rules, wanted))
                 enters = filled = 1;
             if (enters) {
                 goes = wanted;
@@ -346,17 +415,21 @@ INLINE void act(const Colony *c, const Work *w, int foraging, Ant *ant, int tick
             }
         }
         if (!enters) {
-            int towards = pushed_towards(c, w, cell);
-            if (towards >= 0 && gives_way(c, w, cell)) {
+            int towards = entered_from(c, w, cell, WINS | HAS_FOOD);
+            if (towards >= 0 && gives_way(c, w, rules, cell)) {
                 came = 1 + towards;
                 goes = cell + c->steps[came];
                 filled = 1;
                 event = ENTERED_EMPTY;
+                if ((rules & QUEUES) && moves && ant->heading == towards) {
+                    enters = 1; /* it wanted to go there */
+                    event = ant->event;
+                }
             }
         }
         counts[3] += moves && !enters;
     } else {
-        claim &= wins(c, w, cell, want, tick); /* also if it wants nothing: faster than a branch */
+        claim &= wins(c, w, rules, cell, want, tick); /* also if it wants nothing: faster than a branch */
         int enters = moves & claim;
         goes = enters ? wanted : cell;
         came = enters ? want : 0;
@@ -368,24 +441,25 @@ INLINE void act(const Colony *c, const Work *w, int foraging, Ant *ant, int tick
         c->ground[cell] = EMPTY;
     int32_t nowhere; /* without a branch, too */
     *((carries & (goes != cell)) ? &c->trail[goes] : &nowhere) =
-        after_deposit(c, foraging, goes, clock, ant->carried);
+        after_deposit(c, rules, goes, clock, ant->carried);
     if (carries & (action == GIVE) & (goals_in_view(ant->percept) != 0)) {
         event = DELIVERED;
         carries = ant->carries = 0;
-        if (foraging)
-            ant->carried = 0;
+        ant->carried = 0;
+        if (rules & QUEUES)
+            ant->heading = round_turned(ant->heading);
         counts[1]++;
     } else if (!carries & !moves & claim) {
         event = PICKED_UP;
         carries = ant->carries = 1;
         c->ground[wanted] = EMPTY;
-        c->trail[wanted] = after_deposit(c, foraging, wanted, clock, 0);
-        c->trail[cell] = after_deposit(c, foraging, cell, clock, 0);
+        c->trail[wanted] = after_deposit(c, rules, wanted, clock, 0);
+        c->trail[cell] = after_deposit(c, rules, cell, clock, 0);
         ant->heading = round_turned(ant->heading);
     }
     c->ground[goes] = OBSTACLE | (1 + carries) << ANT_SHIFT;
     ant->cell = goes;
-    if (foraging)
+    if (rules & DIRECTED)
         ant->carried += carries;
     ant->event = event;
     ant->want = came;
@@ -393,25 +467,52 @@ INLINE void act(const Colony *c, const Work *w, int foraging, Ant *ant, int tick
 }
 
 /* `pairs` has the n pairs that the thread has updated in this tick; return the new n. */
-INLINE int sense_and_learn(const Colony *c, const Work *w, int foraging, Ant *ant, int clock,
+INLINE int sense_and_learn(const Colony *c, const Work *w, int rules, Ant *ant, int clock,
                            Errors *errors, int32_t *pairs, int n)
 {
-    int event = ant->event, row = 0, cell = ant->cell;
-    int percept = see(c, foraging, cell, ant->heading, ant->carries, clock, &row);
-    int next = foraging ? row : percept;
-    int pair = (foraging ? ant->state : ant->percept) * ROW + ant->action;
-    float discount = event == DELIVERED ? 0.0f : c->discount;
-    float error = (float)c->rewards[event] + discount * w->greedy[next].best - c->q[pair];
-    pairs[n] = pair;
-    n += errors[pair].updates == 0;
-    errors[pair].updates++;
-    errors[pair].sum += (int64_t)floor((double)error * 4294967296.0 + 0.5);
-    errors[pair].latest = error;
+    int event = ant->event, next = 0, cell = ant->cell, drawn = 0;
+    int percept = see(c, rules, cell, ant->heading, ant->carries, clock, &next);
+    if (!(rules & SEES_ANTS))
+        next = percept;
+    float next_value = w->greedy[next].best;
+    if ((rules & SARSA) && event != DELIVERED) {
+        ant->random = advance(ant->random);
+        int action = choose(w->greedy[next].actions, bits_of(ant->random), c->explore_below);
+        next_value = c->q[next * ROW + action];
+        drawn = 1 + action;
+    }
+    if (!(rules & FROZEN)) {
+        int pair = state_of(rules, ant) * ROW + ant->action;
+        float discount = event == DELIVERED ? 0.0f : c->discount;
+        float error = (float)c->rewards[event] + discount * next_value - c->q[pair];
+        pairs[n] = pair;
+        n += errors[pair].updates == 0;
+        errors[pair].updates++;
+        errors[pair].sum += (int64_t)floor((double)error * 4294967296.0 + 0.5);
+        errors[pair].latest = error;
+    }
     ant->percept = percept;
-    if (foraging)
-        ant->state = row;
+    if (rules & SEES_ANTS)
+        ant->state = next;
     w->wants[cell - (ant->want ? c->steps[ant->want] : 0)] = 0; /* its previous cell */
+    if (rules & SARSA)
+        ant->want = drawn;
     return n;
+}
+
+/* Note whose food was taken in a tick, and let food grow back on empty cells when it is time. */
+INLINE void regrow(const Colony *c, int tick)
+{
+    for (int k = 0; k < c->sources; k++) {
+        int cell = c->source_at[k], taken = c->taken[cell];
+        if (taken < 0 && c->ground[cell] != FOOD)
+            taken = tick;
+        if (taken >= 0 && tick - taken >= c->regrowth && c->ground[cell] == EMPTY) {
+            c->ground[cell] = FOOD;
+            taken = -1;
+        }
+        c->taken[cell] = taken;
+    }
 }
 
 /* Update the table by the errors of all threads, and reset the errors. */
@@ -464,11 +565,8 @@ INLINE void sort(const Colony *c, const Work *w, int *places, Ant *spare)
         w->ants[i] = spare[i];
 }
 
-INLINE void run_as(Colony *colony, const Work *work, int foraging, int ticks, int threads)
+INLINE void pass_as(Colony *colony, const Work *work, int rules, int tick, int ticks, int threads)
 {
-    int groups = colony->size / CELLS_TOGETHER + 1;
-    int *places = malloc(sizeof(int) * groups * threads);
-    Ant *spare = malloc(sizeof(Ant) * colony->n);
 #pragma omp parallel num_threads(threads)
     {
         /* Copies that no store through a byte pointer can change. */
@@ -476,34 +574,31 @@ INLINE void run_as(Colony *colony, const Work *work, int foraging, int ticks, in
         const Work mine = *work, *w = &mine;
         int64_t counts[4] = {0};
         int thread = omp_get_thread_num();
-#pragma omp for schedule(static)
-        for (int i = 0; i < c->n; i++) {
-            int row = 0, cell = c->cells[i], heading = c->headings[i];
-            int percept = see(c, foraging, cell, heading, 0, 0, &row);
-            w->ants[i] = (Ant){.random = c->random[i], .cell = cell, .heading = heading,
-                               .percept = percept, .state = row};
-        }
-        for (int tick = 0; tick < ticks; tick++) {
-            int clock = tick * c->evaporates, n = 0;
-            if (c->n >= FEWEST_TO_SORT && tick % TICKS_BETWEEN_SORTS == 0)
-                sort(c, w, places, spare);
+        for (int end = tick + ticks, now = tick; now < end; now++) {
+            int clock = now * c->evaporates, n = 0;
+            if (w->spare && c->n >= FEWEST_TO_SORT && now % TICKS_BETWEEN_SORTS == 0)
+                sort(c, w, w->places, w->spare);
 #pragma omp for schedule(static)
             for (int i = 0; i < c->n; i++)
-                choose_and_want(c, w, foraging, w->ants + i);
-            if (foraging) {
+                choose_and_want(c, w, rules, w->ants + i);
+            if (shares_cells(rules)) {
 #pragma omp for schedule(static)
                 for (int i = 0; i < c->n; i++)
-                    resolve(c, w, w->ants + i, tick, clock);
+                    resolve(c, w, rules, w->ants + i, now, clock);
             }
 #pragma omp for schedule(static)
             for (int i = 0; i < c->n; i++)
-                act(c, w, foraging, w->ants + i, tick, clock, counts);
+                act(c, w, rules, w->ants + i, now, clock, counts);
+            if (c->sources) {
+#pragma omp single
+                regrow(c, now);
+            }
             clock += c->evaporates;
             Errors *errors = w->errors[thread];
             int32_t *pairs = w->pairs[thread];
 #pragma omp for schedule(static) nowait
             for (int i = 0; i < c->n; i++)
-                n = sense_and_learn(c, w, foraging, w->ants + i, clock, errors, pairs + 1, n);
+                n = sense_and_learn(c, w, rules, w->ants + i, clock, errors, pairs + 1, n);
             pairs[0] = n;
 #pragma omp barrier
 #pragma omp single
@@ -513,33 +608,70 @@ INLINE void run_as(Colony *colony, const Work *work, int foraging, int ticks, in
         for (int k = 0; k < 4; k++)
             colony->counts[k] += counts[k];
     }
-    free(places);
-    free(spare);
 }
 
-/* Run an episode of some ticks, in which ants start without food. */
-void run(Colony *c, int foraging, int ticks, int threads)
+/* Advance a colony by some ticks from this one. */
+static void pass_ticks(Colony *c, const Work *w, int rules, int tick, int ticks, int threads)
 {
-    Work w;
-    size_t pairs = (size_t)c->states * ROW;
-    w.ants = malloc(c->n * sizeof *w.ants);
-    w.wants = calloc(c->size, 1);
+    if (rules == PAPERS)
+        pass_as(c, w, PAPERS, tick, ticks, threads);
+    else if (rules == FORAGING)
+        pass_as(c, w, FORAGING, tick, ticks, threads);
+    else if (rules == QUEUEING)
+        pass_as(c, w, QUEUEING, tick, ticks, threads);
+    else
+        pass_as(c, w, rules, tick, ticks, threads); /* others: bits known at run time */
+}
+
+/* Let all ants observe what is in view. */
+static void look_around(const Colony *c, const Work *w, int rules, int clock)
+{
+    for (int i = 0; i < c->n; i++) {
+        Ant *ant = w->ants + i;
+        int row = 0;
+        ant->percept = see(c, rules, ant->cell, ant->heading, ant->carries, clock, &row);
+        ant->state = rules & SEES_ANTS ? row : ant->percept;
+    }
+}
+
+/* Store the best actions of all states, after the table has been set. */
+static void note_best(const Colony *c, const Work *w)
+{
+    for (int state = 0; state < c->states; state++) {
+        float *row = c->q + state * ROW;
+        for (int a = N_ACTIONS; a < ROW; a++)
+            row[a] = -INFINITY;
+        w->greedy[state] = greedy_of(row);
+    }
+}
+
+/* Return how many cells `around` reads before and after an array with a byte for each cell. */
+static int margin(const Colony *c) { return c->steps[2] + 2; }
+
+/* Run an episode of some ticks, in which ants start without food. */
+void run(Colony *c, int rules, int ticks, int threads)
+{
+    Work w = {0};
+    size_t pairs = (size_t)c->states * ROW, groups = c->size / CELLS_TOGETHER + 1;
+    uint8_t *wants = calloc(c->size + 2 * margin(c), 1);
+    w.ants = calloc(c->n, sizeof *w.ants);
+    w.spare = malloc(c->n * sizeof *w.spare);
+    w.places = malloc(groups * threads * sizeof *w.places);
+    w.wants = wants + margin(c);
     w.greedy = malloc(c->states * sizeof *w.greedy);
     for (int t = 0; t < threads; t++) {
         w.errors[t] = calloc(pairs + 64, sizeof **w.errors); /* no cache line is shared */
         w.pairs[t] = calloc(pairs + 64, sizeof **w.pairs);
     }
-    for (int state = 0; state < c->states; state++) {
-        float *row = c->q + state * ROW;
-        for (int a = N_ACTIONS; a < ROW; a++)
-            row[a] = -INFINITY;
-        w.greedy[state] = greedy_of(row);
+    for (int i = 0; i < c->n; i++) {
+        w.ants[i].random = c->random[i];
+        w.ants[i].cell = c->cells[i];
+        w.ants[i].heading = c->headings[i];
     }
-    if (foraging)
-        run_as(c, &w, 1, ticks, threads);
-    else
-        run_as(c, &w, 0, ticks, threads);
+    note_best(c, &w);
+    look_around(c, &w, rules, 0);
+    pass_ticks(c, &w, rules, 0, ticks, threads);
     for (int t = 0; t < threads; t++)
         free(w.errors[t]), free(w.pairs[t]);
-    free(w.ants), free(w.wants), free(w.greedy);
+    free(w.ants), free(w.spare), free(w.places), free(wants), free(w.greedy);
 }

@@ -20,14 +20,9 @@ from taichi_ants.studies import command_line
 from taichi_ants.studies.folder import finished
 
 RESULTS = "results"  # the folder of results in an archive
-_README = """# Archive of a study with Taichi Ants
-
-The results come from this command, which finished {finished}:
-
-    {command}
-
-To compute them again and compare every table and figure, install the versions in `requirements.txt`
-and run `taichi-ants reproduce FILE` with the name of this archive. `ODD.md` describes the model.
+_README = """These results come from `{command}`, which finished {finished}. To compute them
+again and compare every table and figure, install the versions in `requirements.txt`, and run
+`taichi-ants reproduce FILE` with the name of this archive. `ODD.md` describes the model.
 """
 
 
@@ -47,9 +42,9 @@ def run(settings: argparse.Namespace) -> None:
     manifest = finished(folder)
     if out.exists() and not settings.force:
         raise AntsError(f"{str(out)!r} exists; choose another --out, or give --force.")
-    texts = {"ODD.md": odd_of(folder, manifest), "requirements.txt": _requirements(manifest)}
-    texts["README.md"] = _README.format(**manifest)
-    contents = {name: text.encode() for name, text in texts.items()}
+    texts = odd_of(folder, manifest), _requirements(manifest), _README.format(**manifest)
+    names = "ODD.md", "requirements.txt", "README.md"
+    contents = dict(zip(names, map(str.encode, texts), strict=True))
     for path in filter(Path.is_file, folder.rglob("[!.]*")):
         contents[f"{RESULTS}/{path.relative_to(folder).as_posix()}"] = path.read_bytes()
 
@@ -67,10 +62,8 @@ def run(settings: argparse.Namespace) -> None:
 
 def _requirements(manifest: Mapping[str, Any]) -> str:
     """Return the packages of a run with exact versions, in the format of pip's requirements."""
-    versions = dict(manifest["packages"])
-    own = f"taichi-ants=={versions.pop('taichi_ants')}"
-    if manifest["commit"]:
+    own, *others = (f"{name}=={version}\n" for name, version in manifest["packages"].items())
+    if commit := manifest["commit"]:
         changed = "" if manifest["clean"] else ", with changes that are not committed"
-        own = f"# {own} ran from its source, commit {manifest['commit']}{changed}"
-    lines = [f"# Python {manifest['python']}", own, *(f"{n}=={v}" for n, v in versions.items())]
-    return "\n".join([*lines, ""])
+        own = f"# Taichi Ants ran from its source, commit {commit}{changed}\n"
+    return "".join([f"# Python {manifest['python']}\n", own, *others])

@@ -8,8 +8,8 @@ docs/archives.md.
 from __future__ import annotations
 
 import argparse
+import filecmp
 import platform
-import re
 import sys
 import tempfile
 import zipfile
@@ -25,8 +25,6 @@ from taichi_ants.studies.folder import INPUTS, MANIFEST, PAGE, finished, package
 
 STOPPED = command_line.AGAIN
 MOST_BYTES = 1 << 34  # of all unpacked files
-# Pages name the command, the time and the machine of a run, which may differ.
-_SOURCE = re.compile(rb"(<dt>(Command|Finished|Commit|Versions|Machine|Time)</dt><dd>).*?</dd>")
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -52,56 +50,41 @@ def run(settings: argparse.Namespace) -> None:
         unpack(settings.file, temporary)
         folder = Path(temporary, RESULTS)
         manifest = finished(folder)
-        if code := sorted(folder.glob(f"{INPUTS}/*/**/*.py")):
-            names = ", ".join(f"results/{file.relative_to(folder)}" for file in code)
-            if not settings.trust_code:
-                raise AntsError(
-                    f"the study runs code of the archive, {names}; read it, for example with "
-                    "`unzip -p`, and give --trust-code to run it."
-                )
-            command_line.notice(f"Running code of the archive: {names}.")
-        there = {"Python": manifest["python"], **manifest["packages"]}
-        here = {"Python": platform.python_version(), **packages(there)}
-        if differ := [name for name, version in there.items() if here.get(name) != version]:
-            others = (f"{n} {here.get(n, 'is missing')} instead of {there[n]}" for n in differ)
-            command_line.notice(
-                f"These versions differ from those of the archive: {', '.join(others)}."
+        files_of_code = sorted(folder.glob(f"{INPUTS}/*/**/*.py"))
+        code = ", ".join(f"results/{file.relative_to(folder)}" for file in files_of_code)
+        if code and not settings.trust_code:
+            raise AntsError(
+                f"the study runs code of the archive, {code}; read it, for example with "
+                "`unzip -p`, and give --trust-code to run it."
             )
+        here = {"python": platform.python_version(), **packages(manifest["packages"])}
+        for name, there in {"python": manifest["python"], **manifest["packages"]}.items():
+            if here.get(name) != there:
+                command_line.notice(f"The archive has {name} {there}, here is {here.get(name)}.")
         with opened(folder) as planned:
             more = {"no_figures": not manifest["figures"], "parquet": manifest["parquet"]}
             more |= {"out": out, "force": False, "arch": planned.asked["arch"]}
             if not run_study(argparse.Namespace(**vars(settings) | more), planned, report=False):
                 return
-        every = sorted({*manifest["files"], *finished(out)["files"]})
-        different = {name: _difference(name, folder, out) for name in every}
-    for name, words in different.items():
-        print(f"DIFFERENT  {name} ({words})" if words else f"equal      {name}")
-    if number := sum(map(bool, different.values())):
-        print(f"{number} of {len(different)} files differ: the study is not reproduced.")
+        names = sorted({*manifest["files"], *finished(out)["files"]} - {PAGE})
+        equal, *_ = filecmp.cmpfiles(folder, out, names, shallow=False)
+    for name in names:
+        print(f"{'equal      ' if name in equal else 'DIFFERENT  '}{name}")
+    if number := len(names) - len(equal):
+        print(f"{number} of {len(names)} files differ: the study is not reproduced.")
         sys.exit(1)
-    print(f"All {len(different)} files are equal: the study is reproduced.")
+    print(f"All {len(names)} files are equal: the study is reproduced.")
 
 
 def unpack(path: Path, folder: str) -> None:
     """Unpack an archive; AntsError if the file is not one, or is damaged or too large."""
-    with files.opened(path) as file:
-        try:
-            with zipfile.ZipFile(file) as archive:
-                if sum(member.file_size for member in archive.infolist()) > MOST_BYTES:
-                    raise ValueError(f"it unpacks to more than {MOST_BYTES} bytes")
-                archive.extractall(folder)  # below the folder, whatever names members have
-        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError) as error:
-            raise AntsError(
-                f"{files.named(path)} is not an archive that `taichi-ants archive` wrote, or it is "
-                f"damaged ({error!r}); name another file."
-            ) from error
-
-
-def _difference(name: str, old: Path, new: Path) -> str:
-    """Return in words how a table or figure of two folders differs; "" if it is equal."""
-    if not all((folder / name).is_file() for folder in (old, new)):
-        return f"only in the {'archive' if (old / name).is_file() else 'new results'}"
-    texts = [(folder / name).read_bytes() for folder in (old, new)]
-    if name == PAGE:
-        texts = [_SOURCE.sub(rb"\1", text) for text in texts]
-    return "" if texts[0] == texts[1] else "other content"
+    try:
+        with files.opened(path) as file, zipfile.ZipFile(file) as archive:
+            if sum(member.file_size for member in archive.infolist()) > MOST_BYTES:
+                raise ValueError(f"it unpacks to more than {MOST_BYTES} bytes")
+            archive.extractall(folder)  # below the folder, whatever names members have
+    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError) as error:
+        raise AntsError(
+            f"{files.named(path)} is not an archive that `taichi-ants archive` wrote, or it is "
+            f"damaged ({error!r}); name another file."
+        ) from error

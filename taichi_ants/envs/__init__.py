@@ -5,7 +5,7 @@ Importing this package registers them with Gymnasium.
 
 from gymnasium.envs.registration import register
 
-from taichi_ants.task.events import Event, Reason
+from taichi_ants.task.constants import Event, Reason
 
 __all__ = ["Event", "Reason"]
 __dir__ = __all__.copy  # completion lists only public names

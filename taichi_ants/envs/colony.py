@@ -21,8 +21,7 @@ from taichi_ants.envs.vector import (
 )
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features.support import BASE, CASTES, CHOICE
-from taichi_ants.task.constants import N_ACTIONS, RIGHT
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import N_ACTIONS, RIGHT, Event
 
 # The default length of a colony's episode, in ticks.
 MAX_STEPS = 1000

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache, cached_property
 from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,6 +26,7 @@ ANT, NEST, CASTE = "ant", "nest", "caste"
 Task = Any
 Caste = Any
 State = Any  # a `ColonyState`
+_default: Any = cache(lambda settings: settings())  # of a group; they cost more than the rest
 
 
 class Array(NamedTuple):
@@ -139,7 +141,7 @@ class Feature:
     hooks: dict[str, KernelFunction] = field(default_factory=dict)
     inputs: dict[str, tuple[Input, KernelFunction]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def group(self) -> str:
         """The name of its group of settings in a task."""
         return self.settings.path.split(".")[1]
@@ -157,7 +159,7 @@ class Feature:
         """Whether a task uses the feature."""
         if self.uses is not None:
             return self.uses(task)
-        chosen, default = self.of(task), self.settings()
+        chosen, default = self.of(task), _default(self.settings)
         if self.switch:
             return getattr(chosen, self.switch) != getattr(default, self.switch)
         return chosen != default

@@ -159,11 +159,24 @@ class AxialGrid:
         high -= np.minimum(np.minimum(q, r), np.int32(0))
         return high.reshape(-1)
 
-    def number(self, cells: object) -> np.ndarray:
-        """Return the ranks, int64 (...), of cells (..., 3) in the lexicographic order of cells."""
-        normal = normal_form(cells)
+    def closer_to(self, cell: tuple[int, int, int]) -> np.ndarray:
+        """Return bit h by index, 1 if the neighbour at heading h is nearer to `cell` (uint8)."""
+        distances = self.distances(cell).astype(np.uint8)  # modulo 256, as neighbours differ by 1
+        bits = np.zeros(self.size, dtype=np.uint8)
+        for heading, offset in enumerate(self.offsets.tolist()):
+            is_closer = distances - np.roll(distances, -offset) == 1
+            bits |= is_closer.astype(np.uint8) << np.uint8(heading)
+        return bits * self.exists
+
+    def number(self, index: np.ndarray) -> np.ndarray:
+        """Return the ranks, int32 (...), of flat indices (...) in lexicographic order of cells."""
         _, y_range, z_range = self.ranges
-        x, y, z = normal[..., 0], normal[..., 1], normal[..., 2]
+        r, q = np.divmod(index.astype(np.int32), np.int32(self.width))
+        r -= z_range
+        q -= z_range
         # x = 0 leaves y and z free. Each x > 0 has first y = 0 with any z, then z = 0 with y > 0.
-        first = y_range * z_range + (x - 1) * (y_range + z_range - 1)
-        return np.where(x == 0, y * z_range + z, first + np.where(y == 0, z, z_range + y - 1))
+        if_x_is_0, per_x = (r - q) * z_range - q, y_range + z_range - 1
+        if_y_is_0 = (q - r - 1) * per_x - r
+        if_z_is_0 = (q - 1) * per_x + r + z_range - 1
+        further = np.where(r <= 0, if_y_is_0, if_z_is_0) + y_range * z_range
+        return np.where(q <= np.minimum(r, 0), if_x_is_0, further)

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from taichi_ants.errors import AntsError
-from taichi_ants.settings import Setting, Settings, Share, declared
+from taichi_ants.settings import Setting, Settings, Share, declared, table_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -87,9 +87,14 @@ class TrainingConfig(Settings, path="training"):
         for setting in declared(TrainingConfig):
             object.__setattr__(self, setting.name, values[setting.name])
         self.check()
-        pairs = {**dict(hyperparameters), **more}
-        plain = {name: getattr(value, "item", lambda v=value: v)() for name, value in pairs.items()}
+        pairs = {**table_of("training.hyperparameters", hyperparameters), **more}
+        plain = {n: v.item() if getattr(v, "size", 0) == 1 else v for n, v in pairs.items()}
         object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
+
+    @classmethod
+    def from_dict(cls, facts: Any) -> TrainingConfig:
+        """Return the configuration in a mapping, which can have hyperparameters, too."""
+        return cls(**{**cls._required(facts), **facts})
 
     @classmethod
     def frozen(cls, epsilon: float = 0.0) -> TrainingConfig:

@@ -15,8 +15,7 @@ import numpy as np
 from taichi_ants.errors import AntsError
 from taichi_ants.features import FEATURES
 from taichi_ants.measures.measure import COUNTS, MEASURES, Measure
-from taichi_ants.task.constants import FOOD, OBSTACLE, QUEEN
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import FOOD, OBSTACLE, QUEEN, Event
 
 if TYPE_CHECKING:
     from taichi_ants.records import Snapshot

@@ -20,8 +20,7 @@ from taichi_ants.errors import expect
 from taichi_ants.learners.config import InitialValue
 from taichi_ants.offline.dataset import Dataset
 from taichi_ants.settings import Count, Flag, Setting, Share, checked_arguments
-from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import N_ACTIONS, Event
 
 # Below 1, so that values of endless episodes are finite; at 0.9999 Q iteration takes half a second.
 Discount = Annotated[Share, Setting(most=0.9999)]

@@ -16,8 +16,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import action_probabilities, checked_values, random_policy
 from taichi_ants.offline.dataset import COLUMNS, Dataset
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EPISODE_STEPS, MAX_STEPS
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EPISODE_STEPS, MAX_STEPS, Event
 from taichi_ants.worlds.world import World
 
 # Of colonies: probabilities and rewards of actions must follow from action values and events.

@@ -16,8 +16,7 @@ from taichi_ants.reference.random_stream import hash_of, pick
 from taichi_ants.reference.world_state import WorldState, computed
 from taichi_ants.rules import Rule
 from taichi_ants.task import Task, Traffic
-from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, SEES_CUE, SEES_EMPTY, SEES_GOAL
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, SEES_CUE, SEES_EMPTY, SEES_GOAL, Event
 
 # The field of `Rewards` for each event.
 PAID = {

@@ -10,7 +10,7 @@ import numpy as np
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells, queens_of
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import Event
 from taichi_ants.worlds.world import World
 
 Pair = tuple[int, int]  # state, action

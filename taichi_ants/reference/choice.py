@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.reference.ants import Ant
+from taichi_ants.reference.cues import sense
 from taichi_ants.reference.features import inputs_of
 from taichi_ants.reference.observations import AHEAD, cells_in_view, levels_in_view, ways
 from taichi_ants.reference.random_stream import WORDS, RandomStream, pick
@@ -64,7 +65,7 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
     if SEES_GOAL in seen:
         return GIVE if ant.carries else PICK_UP
     weights, cue = [0.0, 0.0, 0.0], world.cue(ant)
-    if world.has_compass(ant) and choice.carriers_follow is not None:
+    if sense(world, ant) and choice.carriers_follow is not None:
         cue = world.pheromones[choice.carriers_follow]
     is_open, nearer = ways(world, ant, seen, traffic)
     for side, cell in enumerate(cells_in_view(ant)):

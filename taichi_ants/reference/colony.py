@@ -24,8 +24,7 @@ from taichi_ants.reference.observations import OBSERVATIONS, codes_in_view, obse
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task
-from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, Event
 from taichi_ants.worlds.world import World
 
 
@@ -100,7 +99,7 @@ class ReferenceColony:
     @property
     def castes(self) -> list[Caste]:
         """The castes of the task, or one without settings."""
-        return list(self.task.castes.values()) or [Caste()]
+        return list(self.task.castes.values()) or [castes.ONE]
 
     def table_of(self, ant: Ant | Transition) -> int:
         """Return the number of the table of an ant."""

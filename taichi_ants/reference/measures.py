@@ -12,8 +12,7 @@ from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.features import TWINS
 from taichi_ants.reference.geometry import Cell, distance, listed_cells, neighbour
-from taichi_ants.task.constants import OBSTACLE
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import OBSTACLE, Event
 
 NONE = math.nan
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.geometry import Cell, distance, neighbour
+from taichi_ants.reference.cues import homing_sense, sense
+from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.world_state import Level, Trail, WorldState
 from taichi_ants.rules.inputs import Vector
 from taichi_ants.task import Observation, Traffic
@@ -59,19 +60,17 @@ def nestmate(world: WorldState, ant: Ant, cell: Cell) -> Ant | None:
 def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
     """Return whether a cell is better for an ant than its own.
 
-    A better cell is nearer to the queen for a carrier with a compass, and has a higher level of the
-    ant's cue for other ants.
+    A better cell has a higher level of the ant's cue, unless that is not a pheromone, see `cues`.
     """
-    if world.has_compass(ant):
-        queen = world.queens[ant.nest]
-        return distance(cell, queen) < distance(ant.cell, queen)
+    if better := sense(world, ant):
+        return better(world, ant, cell)
     trail = world.cue(ant)
     return bool(trail.level(cell) > trail.level(ant.cell))
 
 
 def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
     """Return the code of each cell: SEES_EMPTY, SEES_OBSTACLE, SEES_CUE or SEES_GOAL."""
-    strongest = 0 if world.has_compass(ant) else strongest_in_view(world, ant)
+    strongest = 0 if sense(world, ant) else strongest_in_view(world, ant)
     return [_code(world, ant, cell, strongest) for cell in cells_in_view(ant, turns)]
 
 
@@ -82,7 +81,7 @@ def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
         return SEES_GOAL
     if content != EMPTY:  # also queens, and food for carriers
         return SEES_OBSTACLE
-    if world.has_compass(ant):
+    if sense(world, ant):
         shows_cue = is_better(world, ant, cell)
     else:
         trail = world.cue(ant)
@@ -128,16 +127,17 @@ def ants_seen(world: WorldState, ant: Ant) -> int:
 def ways(
     world: WorldState, ant: Ant, codes: Sequence[int], traffic: Traffic
 ) -> tuple[list[bool], list[bool]]:
-    """Return which cells ahead an ant can enter, and which are nearer to its queen.
+    """Return which cells ahead an ant can enter, and which are better.
 
-    Only an ant with a compass knows the latter. `codes` are those of the cells as it sees them.
+    The latter are those of a cue that is not a pheromone. `codes` are those of the cells as the ant
+    sees them.
     """
-    has_compass = world.has_compass(ant)
+    senses = sense(world, ant) is not None
     is_open = [code in (SEES_EMPTY, SEES_CUE) for code in codes]
-    nearer = [code == SEES_CUE and has_compass for code in codes]
+    nearer = [code == SEES_CUE and senses for code in codes]
     for side, cell in enumerate(cells_in_view(ant)):
         if cell in world.ants and side - 1 not in ant.misread:
-            nearer[side] = has_compass and is_better(world, ant, cell)
+            nearer[side] = senses and is_better(world, ant, cell)
             if traffic.shared and nestmate(world, ant, cell):
                 is_open[side] = ant.carries or traffic.follow
     return is_open, nearer
@@ -203,10 +203,9 @@ def yours(observation: Observation, world: WorldState, ant: Ant) -> int:
     turns, cells = observation.cells, cells_in_view(ant, observation.cells)
     seen = [turn not in ant.misread for turn in turns]
     others = [world.ants.get(cell) if s else None for cell, s in zip(cells, seen, strict=True)]
-    cue, queen = world.cue(ant), world.queens[ant.nest]
     # All levels of cues are float32 if those of one cue are.
-    cues = {name for pair in world.cues for name in pair if name != "compass"}
-    dense = any(world.pheromones[name].rule.dense for name in cues)
+    followed = {name for pair in world.cues for name in pair} & world.pheromones.keys()
+    dense = any(world.pheromones[name].rule.dense for name in followed)
 
     def levels(trail: Trail, dense: bool) -> tuple[Vector, Any]:
         """Return the levels of the cells, and that of the ant's cell."""
@@ -214,10 +213,9 @@ def yours(observation: Observation, world: WorldState, ant: Ant) -> int:
         in_view = levels_in_view(world, ant, trail, turns, ant.misread)
         return Vector(map(kind, in_view)), kind(trail.level(ant.cell))
 
-    ahead, own_level = levels(cue, dense)
-    if world.cues[ant.caste][1] == "compass":
-        far = distance(ant.cell, queen)
-        nearer = [distance(cell, queen) < far for cell in cells]
+    ahead, own_level = levels(world.cue(ant), dense)
+    if better := homing_sense(world, ant):
+        nearer = [better(world, ant, cell) for cell in cells]
     else:
         nearer = [bool(level > own_level) for level in ahead]
     view: dict[str, Any] = {

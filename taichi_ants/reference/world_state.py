@@ -162,14 +162,10 @@ class WorldState:
         """The trail."""
         return self.pheromones["trail"]
 
-    def has_compass(self, ant: Ant) -> bool:
-        """Return whether an ant with this load looks for cells nearer to the queen."""
-        return ant.carries and self.cues[ant.caste][1] == "compass"
-
     def cue(self, ant: Ant) -> Trail:
-        """Return the pheromone that an ant follows; with a compass, that of ants without food."""
+        """Return the pheromone that an ant follows, by default that of ants without food."""
         outbound, homing = self.cues[ant.caste]
-        uses_homing = ant.carries and homing != "compass"
+        uses_homing = ant.carries and homing in self.pheromones
         return self.pheromones[homing if uses_homing else outbound]
 
     def full(self, kind: int) -> int:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_ants.errors import AntsError, as_array, expect
+from taichi_ants.features.cues import COMPASS, CUES
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.records import Snapshot
@@ -16,7 +17,7 @@ from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks
 from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, FOOD, N_ACTIONS, QUEEN
-from taichi_ants.task.field import COMPASS, TRAIL
+from taichi_ants.task.field import TRAIL
 from taichi_ants.task.states import TASK_NAMES
 
 _PAPER = observations.get("paper")
@@ -45,7 +46,7 @@ _LEGEND = (
     _Entry("obstacle (O)", "O"),
     _Entry("food (F)", "F"),
     _Entry("queen (Q)", "Q"),
-    _Entry("nearer to the queen", letter="S"),
+    _Entry("", letter="S"),  # the label is that of the cue
     _Entry("ant", ant=False),
     _Entry("ant with food", ant=True),
 )
@@ -188,9 +189,11 @@ class Scene:
     ) -> None:
         """Draw the legend, which grows upwards with its entries."""
         cue = self._task.homing_cue if self._task else COMPASS
-        if cue != COMPASS:
+        if cue in CUES:
+            label = CUES[cue].words
+        else:
             label = "trail (S)" if cue == TRAIL else f"field {cue} (S)"
-            entries = [entry._replace(label=label) if entry.letter else entry for entry in entries]
+        entries = [entry._replace(label=label) if entry.letter else entry for entry in entries]
         pitch, radius = round(_PITCH * size), 0.82 * size
         x, hexagon = left + 0.85 * size, self._rasteriser.hexagon
         first = self._height - self._margin - round(_LEGEND_HEIGHT * size) + len(_LEGEND) * pitch

@@ -13,14 +13,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from taichi_ants import files, learners
+from taichi_ants import files, learners, rules
 from taichi_ants.analysis.tables import Table
 from taichi_ants.errors import AntsError
 from taichi_ants.features import FEATURES
 from taichi_ants.features.feature import Feature
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
-from taichi_ants.rules.rule import RULES
 from taichi_ants.settings import DeclaredSetting, Named, Settings, all_of, declared, flat
 from taichi_ants.studies.folder import asked_in
 from taichi_ants.studies.sweep_file import KINDS, declaration_of
@@ -188,7 +187,7 @@ class Model:
         return [row[name] for row in rows if self.uses(row, name, self.declaration(name, row))]
 
     def submodels(self) -> Iterator[str]:
-        """Yield a paragraph on each group of settings, and on each rule that the author wrote."""
+        """Yield a paragraph on each group of settings, and on each rule that is a function."""
         for path, cls, title in self.groups():
             is_used = self.of_colony or not path.startswith(_OF_COLONIES)
             if path == "task.rewards":
@@ -196,8 +195,8 @@ class Model:
             if said := list(self.sentences(path, cls)) if is_used else []:
                 yield f"*{title}.* {' '.join(said)}"
         for name in self.entries("rules"):
-            rule = RULES.yours.get(name)
-            words = inspect.getdoc(rule.function) if rule else None
+            is_known = name in rules.names()
+            words = inspect.getdoc(rules.get(name).function) if is_known else None
             yield f"*Rule `{name}`.* {words or 'See the plugin.'}"
 
     def learning(self) -> str:

@@ -37,7 +37,7 @@ _OF_ANTS = {  # of all kinds of rules that ants follow
 }
 _OF_ACTIONS = {  # of rules that are called after an action
     "carries": Input("1 if the ant has food after its action, else 0"),
-    "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
+    "event": Input("result of the ant's action, see `taichi_ants.task.constants.Event`"),
     "paper_state": Input("the paper's state of the ant before its action, 0 to 127"),
     **_OF_ANTS,
 }
@@ -49,7 +49,7 @@ KINDS: dict[str, RuleKind] = {
             "values": Input("action values of the ant's state; the ants then need a table", 5),
             "codes": Input("codes seen: 0 E, 1 O, 2 T or S, 3 F or Q; see the glossary", AHEAD),
             "levels": Input(f"levels of {_CUE}; 0 on obstacles, food and misread cells", AHEAD),
-            "nearer": Input("1 if the cell is seen as S by the compass, else 0", AHEAD),
+            "nearer": Input("1 if the cell is better by a cue such as the compass, else 0", AHEAD),
             "is_open": Input("1 if the ant can try to enter the cell, else 0", AHEAD),
             "level": Input("level of the ant's cue on its own cell"),
             "carries": Input("1 with food, else 0"),
@@ -139,9 +139,9 @@ def drawn(rng: np.random.Generator, name: str, length: int = 0) -> Any:
     if name == "reward":
         return float(rng.integers(-MOST_REWARD, MOST_REWARD + 1))
     if name == "values":
-        return float(np.float32(rng.choice([0.0, 1.0, rng.normal(scale=30)])))
+        return float(np.float32((0.0, 1.0, rng.normal(scale=30))[rng.integers(3)]))
     # Usual levels are often drawn, and the largest ones sometimes.
-    level = rng.choice([0.0, 250.0, 10 ** rng.uniform(0, 9 if rng.random() < 0.25 else 6)])
+    level = (0.0, 250.0, 10 ** rng.uniform(0, 9 if rng.random() < 0.25 else 6))[rng.integers(3)]
     return float(np.float32(level) if rng.random() < 0.5 else int(level))
 
 

@@ -1,4 +1,4 @@
-"""Rules that you write: their parameters, their registration, and their trial on drawn inputs."""
+"""Rules that are functions: parameters, registration, and trial on drawn inputs."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type
 
 from taichi_ants.errors import AntsError, check_one_of, shown, unusable
 from taichi_ants.registry import Registry
+from taichi_ants.rules.built_in import FUNCTIONS, WORDS
 from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, input_of, values_shown
 from taichi_ants.rules.language import LanguageError, kernel_source
 from taichi_ants.settings import Setting, Settings, declared
@@ -18,12 +19,6 @@ if TYPE_CHECKING:
     import numpy as np
 
 TRIES = 2000  # drawn sets of inputs with which `register` tries a rule
-BUILT_IN = {
-    "choice": ("greedy", "softmax", "deneubourg"),
-    "deposit": ("set", "add", "fading", "none"),
-    "evaporation": ("linear", "exponential", "none"),
-    "reward": ("by_event",),
-}
 
 
 @dataclass(frozen=True)
@@ -42,7 +37,7 @@ class Parameters(Settings, path="task.rules.NAME"):
 
 @dataclass(frozen=True, eq=False)
 class Rule:
-    """A rule that you wrote: a function of inputs, and of parameters.
+    """A rule that you wrote, or a built-in one: a function of inputs, and of parameters.
 
     Attributes:
         name: The name that tasks use.
@@ -85,10 +80,10 @@ class Rule:
         return math.floor(result) if kind.is_whole else result
 
 
-# Built-in rules are words, which the engine implements.
+# The built-in functions follow at the end of the file.
 RULES: Registry[Rule] = Registry(
     *("rule", "taichi_ants.rules.register", {}),
-    reserved=[name for names in BUILT_IN.values() for name in names],
+    reserved=[word for some in WORDS.values() for word in some],
 )
 
 
@@ -128,19 +123,24 @@ def register(
                 f"{called!r} is the name of a rule of the kind {RULES.yours[called].kind!r}; "
                 "choose another name."
             )
-        inputs, settings = _arguments(called, kind, function)
-        arguments = inspect.signature(function).parameters
-        lengths = {name: inputs[name].length if name in inputs else 0 for name in arguments}
-        rule = Rule(called, kind, function, inputs, settings, "")
-        try:
-            rule = replace(rule, source=kernel_source(function, lengths))
-        except LanguageError as error:
-            raise unusable(rule, error) from None
+        rule = _rule(called, kind, function)
         _try_in_python(rule)
         RULES.add(called, rule)
         return function
 
     return add
+
+
+def _rule(name: str, kind: str, function: Callable[..., Any]) -> Rule:
+    """Return a function as a rule; AntsError if kernels cannot compute it."""
+    inputs, settings = _arguments(name, kind, function)
+    arguments = inspect.signature(function).parameters
+    lengths = {name: inputs[name].length if name in inputs else 0 for name in arguments}
+    rule = Rule(name, kind, function, inputs, settings, "")
+    try:
+        return replace(rule, source=kernel_source(function, lengths))
+    except LanguageError as error:
+        raise unusable(rule, error) from None
 
 
 def _arguments(
@@ -178,7 +178,7 @@ def drawn_parameters(rule: Rule, rng: np.random.Generator) -> dict[str, Any]:
     for setting in declared(rule.settings):
         least, most = setting.rule.least, setting.rule.most
         if least is not None and most is not None and rng.random() < 0.5:
-            value = float(rng.choice([least, most, rng.uniform(least, most)]))
+            value = float((least, most, rng.uniform(least, most))[rng.integers(3)])
             values[setting.name] = round(value) if setting.kind is int else value
     return values
 
@@ -213,15 +213,22 @@ def _try_in_python(rule: Rule) -> None:
 
 
 def registered(kind: str, name: str) -> Rule | None:
-    """Return your rule of this name; None for the built-in rules of a kind."""
-    return None if name in BUILT_IN[kind] else get(name)
+    """Return the rule of this name; None for the words that the engine implements."""
+    return None if name in WORDS[kind] else get(name)
 
 
 def names(kind: str | None = None) -> tuple[str, ...]:
-    """Return the names of your rules, of one kind or of all, in the order of registration."""
-    return tuple(name for name, rule in RULES.yours.items() if kind in (None, rule.kind))
+    """Return the names of rules, of one kind or of all: built-in functions, then yours."""
+    return tuple(name for name in RULES.names() if kind in (None, get(name).kind))
 
 
 def words(kind: str) -> tuple[str, ...]:
-    """Return all words that name a rule of a kind: the built-in ones, then yours."""
-    return (*BUILT_IN[kind], *names(kind))
+    """Return all words that name a rule of a kind, those that the engine implements first."""
+    return (*WORDS[kind], *names(kind))
+
+
+RULES.built_in = {
+    function.__name__: _rule(function.__name__, kind, function)
+    for kind, functions in FUNCTIONS.items()
+    for function in functions
+}

@@ -1,12 +1,8 @@
 """Designs: which points of ranges of settings a sweep runs, and the sensitivity indices they give.
 
 A setting of a sweep file has a list of values, or a range: `{ from = 10, to = 99, scale = "log" }`.
-A grid combines all values. For other designs, SciPy and SALib draw points of the unit cube from a
-scrambled sequence of Sobol, whose shares become values. A point depends only on the settings that
-vary, the seed of the design, and its number.
-
-The first-order index of Sobol is the share of a measure's variance that a setting makes by itself,
-and the total index adds what it makes together with others.
+A grid combines all values. A Sobol design draws points of the unit cube, whose shares become
+values; a point depends only on the settings that vary, the seed of the design, and its number.
 """
 
 from __future__ import annotations
@@ -21,20 +17,19 @@ import numpy as np
 
 from taichi_ants.analysis.statistics import RANDOM_SEED, all_equal, known_means
 from taichi_ants.analysis.tables import Table, number, plain_text
-from taichi_ants.errors import AntsError, imported, shown
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.settings import Flag, Setting, Settings
 
 _DRAWN = ("design", "sobol")  # the condition of the other keys
+_NORMAL_95 = 1.959963984540054  # half of the width of an interval, in standard deviations
 COLUMNS = ("measure", "setting", "first_order", "first_order_low", "first_order_high",
     "total", "total_low", "total_high")  # of the table of indices  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Range:
-    """A range of numbers with both ends; `whole` has whole numbers only, as int.
-
-    With `log`, equal factors are equally frequent, otherwise equal differences.
-    """
+    """A range of numbers with both ends; if `whole`, of int; equal factors are equally frequent
+    if `log`, else equal differences."""
 
     low: float
     high: float
@@ -48,14 +43,15 @@ class Range:
         (low, high), scale = ends, table.get("scale", "linear")
         kinds, log = (int,) if whole else (int, float), scale == "log"
         fits = all(type(end) in kinds and abs(end) <= 2**53 for end in ends)
-        fits = fits and low < high and (low > 0 or not log) and (log or scale == "linear")
+        fits = fits and low < high and (low > 0 if log else scale == "linear")
         if not fits or table.keys() - {"from", "to", "scale"}:
             raise AntsError(
                 f"{name} is {shown(dict(table))}; a range has the keys from and to, which are "
                 f"{'whole ' * whole}numbers, the first the smaller one, and perhaps the scale "
                 "linear or, if both are above 0, log."
             )
-        return cls(low if whole else float(low), high if whole else float(high), log, whole)
+        number = int if whole else float
+        return cls(number(low), number(high), log, whole)
 
 
 Axis = Range | Sequence[Any]  # of a sequence, all values are equally frequent
@@ -100,7 +96,7 @@ class Design(Settings):
     """
 
     design: Annotated[Literal["grid", "sobol"], Setting()] = "grid"
-    samples: Annotated[int | None, Setting(least=1, most=100_000, only=_DRAWN)] = None
+    samples: Annotated[int | None, Setting(only=_DRAWN)] = None
     design_seed: Annotated[int, Setting(least=0, most=2**63 - 1, only=_DRAWN)] = 0
     sensitivity: Annotated[Flag, Setting(only=_DRAWN)] = False
     margin: Annotated[float, Setting(least=0, only=("design", "grid"))] = 0.0
@@ -111,16 +107,8 @@ class Design(Settings):
         return self.design == "grid"
 
     def _faults(self) -> Iterator[str]:
-        if self.samples is None and not self.is_grid:
-            yield "samples is missing; give the number of points of the design."
-        if self.sensitivity and self.samples not in [2**n for n in range(1, 17)]:
-            yield f"sensitivity = true with samples = {self.samples} needs a power of 2, as 64."
-
-    def facts(self) -> dict[str, Any]:
-        """Return what determines points and findings besides the settings that vary."""
-        more = {"sensitivity": True} if self.sensitivity else {}
-        own = {"design": self.design, "design_seed": self.design_seed, **more}
-        return {"margin": self.margin, **({} if self.is_grid else {"design": own})}
+        if not self.is_grid and self.samples not in (2**n for n in range(1, 17)):
+            yield f"samples is {self.samples}; it must be a power of 2 up to 65536, such as 64."
 
     def rows(self, axes: Mapping[str, Axis]) -> list[dict[str, Any]]:
         """Return the points: a value of each axis by name; AntsError if axes do not suit."""
@@ -140,48 +128,50 @@ class Design(Settings):
         return rows
 
     def shares(self, dimensions: int) -> np.ndarray:
-        """Return points of the unit cube, float64 (points, dimensions), for other than grids.
-
-        Raises AntsError if `sensitivity` needs SALib, which is not installed.
-        """
-        n: Any = self.samples
-        if self.sensitivity:
-            sobol = imported("sensitivity = true", "SALib.sample.sobol", "sensitivity")
-            how = {"calc_second_order": False, "seed": self.design_seed}
-            return sobol.sample(_problem([*map(str, range(dimensions))]), n, **how)
+        """Return points of the unit cube, float64 (points, dimensions), for other than grids."""
         from scipy.stats import qmc
 
-        # `random` warns unless the number is a power of 2, so the sequence is cut.
-        whole = math.ceil(math.log2(n))
-        return qmc.Sobol(dimensions, seed=self.design_seed).random_base2(whole)[:n]
-
-
-def _problem(names: Sequence[str]) -> dict[str, Any]:
-    """Return the unit cube as SALib takes it."""
-    return {"num_vars": len(names), "names": names, "bounds": [[0, 1]] * len(names)}
+        sequence = qmc.Sobol(dimensions * (1 + self.sensitivity), seed=self.design_seed)
+        drawn = sequence.random(self.samples)
+        if not self.sensitivity:
+            return drawn
+        first, last = np.split(drawn[:, None], 2, axis=2)
+        from_last = np.eye(dimensions + 2, dimensions, -1, dtype=bool)
+        from_last[-1] = True
+        return np.where(from_last, last, first).reshape(-1, dimensions)
 
 
 def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[dict[str, Any]]:
     """Return the indices of settings as rows with `COLUMNS`, with 95 % intervals from a bootstrap.
 
-    `values` of the measure are float64 (points, seeds), for the points of Saltelli's scheme. Seeds
-    without a value (nan) do not count. The list is empty if a point has no value at all, or all
-    means over seeds are equal.
+    The estimators are those of Saltelli et al. (2010). `values` of the measure are float64 (points,
+    seeds), for the points of Saltelli's scheme. Seeds without a value (nan) do not count. The list
+    is empty if a point has no value at all, or all means over seeds are equal.
     """
-    from SALib.analyze import sobol
-
     means = known_means(values)
     if np.isnan(means).any() or all_equal(means[None])[0]:
         return []
-    how = {"calc_second_order": False, "num_resamples": 1000, "seed": RANDOM_SEED}
-    found, rows = sobol.analyze(_problem(names), means, **how), []
-    for n, name in enumerate(names):
+    first, *between, last = ((means - means.mean()) / means.std()).reshape(-1, len(names) + 2).T
+    draws = np.random.default_rng(RANDOM_SEED).integers(len(first), size=(len(first), 1000))
+    rows = []
+    for name, mixed in zip(names, between, strict=True):
+        found, resampled = (
+            _indices(first, mixed, last),
+            _indices(*(y[draws] for y in (first, mixed, last))),
+        )
         ends = []
-        for index in ("S1", "ST"):
-            value, half = float(found[index][n]), float(found[f"{index}_conf"][n])
-            ends += [value, value - half, value + half]
+        for index, of_resamples in zip(found, resampled, strict=True):
+            half = _NORMAL_95 * of_resamples.std(ddof=1)
+            ends += [float(each) for each in (index, index - half, index + half)]
         rows.append(dict(zip(COLUMNS, (measure, name, *ends), strict=True)))
     return rows
+
+
+def _indices(first: np.ndarray, mixed: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return first-order and total index of the setting that `mixed` has from `last`."""
+    variance = np.var(np.concatenate([first, last]), axis=0)
+    alone = np.mean(last * (mixed - first), axis=0) / variance
+    return alone, 0.5 * np.mean((first - mixed) ** 2, axis=0) / variance
 
 
 def report(rows: Sequence[Mapping[str, Any]], seeds: int) -> str:

@@ -43,7 +43,7 @@ INPUTS, SESSIONS = "inputs", "sessions"
 _OF_ALL = (STUDY, INPUTS, BLOCKS, SESSIONS)
 _BESIDE_SETTINGS = "physics", "version", "plugin", "arch"  # what else determines results
 # Packages that results depend on, if this package runs without being installed, and extras.
-_DIRECT, _EXTRAS = ("taichi", "numpy", "scipy", "matplotlib"), ("pyarrow", "SALib", "ray")
+_DIRECT, _EXTRAS = ("taichi", "numpy", "scipy", "matplotlib"), ("pyarrow", "ray")
 
 
 @dataclass(frozen=True)

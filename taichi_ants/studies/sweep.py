@@ -57,7 +57,7 @@ class Sweep:
         """Return what determines the results besides the settings of the points."""
         own = {k: v for k, v in self.base.reading.items() if k == "measure_every"}
         own |= {"measures": self.base.measures, "against": self.against}
-        return {**own, **self.design.facts(), "vary": self.settings}
+        return {**own, **vars(self.design), "vary": self.settings}
 
     def findings(self, values: np.ndarray) -> dict[int, dict[str, Any]]:
         """Return by row the finding on its difference from the row with the value `against`.

@@ -152,10 +152,7 @@ class Base(NamedTuple):
         if events:
             lists = {name: [of[n] for n in sorted(of, key=int)] for name, of in events.items()}
             tree["protocol"] = protocol.read(lists)
-        for setting in declared(TrainingConfig)[:5]:  # the others have defaults
-            if setting.name not in training:
-                raise AntsError(f"{setting.path} is missing; add it to [training] or [vary].")
-        config = TrainingConfig(**training)
+        config = TrainingConfig.from_dict(training)
         point = KINDS[self.kind](built[key], task, config, **tree, **self.reading)
         for name in self.measures:
             # With fewer than 50 episodes, `compare` uses all of them; a sweep refuses.

@@ -11,7 +11,6 @@ from taichi_ants.settings import Setting
 from taichi_ants.task.pheromone import Pheromone
 
 Laid = Literal["with_food", "without_food", "always", "dead_end", "failed_pick_up", "never"]
-COMPASS = "compass"  # the name of the cue that is not a pheromone
 
 
 class Occasion(IntFlag):

@@ -5,23 +5,30 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from taichi_ants.features import used_by
+from taichi_ants.features.cues import CUES
 from taichi_ants.task.constants import ROW
-from taichi_ants.task.field import COMPASS, TRAIL
+from taichi_ants.task.field import TRAIL
 from taichi_ants.task.task import Task
 
 
 class Cues(NamedTuple):
     """The cues of some ants: numbers of pheromones, and their views.
 
-    Ants with food follow the pheromone `followed`, see `steps.cue_level`, which is their homing cue
-    unless that is the compass. `half` says whether the view of the outbound cue is "half".
+    Ants with food follow the pheromone `followed`, see `steps.cue_level`. That is their homing cue
+    unless `sense` is its name, a key of `CUES`. `half` says whether the view of the outbound cue is
+    "half".
     """
 
     outbound: int
     followed: int
-    has_compass: bool
+    sense: str
     half: bool
     homing_view: str
+
+    @property
+    def has_sense(self) -> bool:
+        """Whether the homing cue is not a pheromone."""
+        return self.sense != ""
 
 
 class Model:
@@ -85,8 +92,8 @@ class Model:
             for number, pheromone in enumerate(pheromones)
         )
         self.dense = any(self.dense_by_number)
-        carriers_follow = task.number_of(task.choice.carriers_follow or COMPASS)
-        self.cues = tuple(self._cues(*pair, carriers_follow) for pair in pairs)  # of all castes
+        self.cues = tuple(self._cues(task, *pair) for pair in pairs)  # of all castes
+        self.senses = tuple(dict.fromkeys(cues.sense for cues in self.cues if cues.sense))
         followed = {number for cues in self.cues for number in (cues.outbound, cues.followed)}
         self.sees_dense = any(self.dense_by_number[number] for number in followed)
         self.reads = tuple(task.number_of(name) for name in self.observation.reads)
@@ -95,7 +102,8 @@ class Model:
         self.sees_paper_state = self.is_papers and not self.misreads
         # Whether the cell of an ant must show that the ant carries food.
         under_carriers = any(self.views[cue] == "strongest_under_carriers" for cue in followed)
-        self.sees_ants = not self.is_papers or under_carriers
+        sees_loads = any(CUES[sense].sees_loads for sense in self.senses)
+        self.sees_ants = not self.is_papers or under_carriers or sees_loads
 
         # Your own rules, in the order of their parameters, and where they are used.
         self.rules, self.choice = task.own_rules, task.choice.rule
@@ -110,12 +118,12 @@ class Model:
         inputs = [read for rule in self.rules for read in rule.inputs.values()]
         self.reads_deliveries = any(read.by_deliveries for read in inputs)
 
-    def _cues(self, outbound: int, homing: int, carriers_follow: int) -> Cues:
+    def _cues(self, task: Task, outbound: int, homing: int) -> Cues:
         half = self.views[outbound] == "half"
         if homing >= 0:
-            return Cues(outbound, homing, False, half, self.views[homing])
-        followed = carriers_follow if carriers_follow >= 0 else outbound
-        return Cues(outbound, followed, True, half, "")
+            return Cues(outbound, homing, "", half, self.views[homing])
+        followed = task.number_of(task.choice.carriers_follow or task.cues[outbound])
+        return Cues(outbound, followed, task.cues[homing], half, "")
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Model) and vars(self) == vars(other)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from taichi_ants.rules.rule import BUILT_IN, Rule, registered, words
+from taichi_ants.rules.built_in import WORDS
+from taichi_ants.rules.rule import Rule, registered, words
 from taichi_ants.settings import Setting, Settings, Share
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 View = Literal["half", "strongest", "strongest_under_carriers"]
-DEPOSITS = BUILT_IN["deposit"]
+DEPOSITS = WORDS["deposit"]
 MAX_DEPOSIT = 1_000_000
 LINEAR = -1.0  # marks linear evaporation in place of a decay factor
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from taichi_ants.features.foods import Reward
 from taichi_ants.settings import Setting, Settings
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import Event
 
 if TYPE_CHECKING:
     import numpy as np

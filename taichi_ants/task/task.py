@@ -12,6 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from taichi_ants.errors import shown
 from taichi_ants.features import FEATURES, probabilities, used_by
 from taichi_ants.features.castes import ALL, NOTHING, Caste, parts_in
+from taichi_ants.features.cues import COMPASS, CUES
 from taichi_ants.features.foods import Food
 from taichi_ants.features.labour import Labour
 from taichi_ants.features.life import Life
@@ -20,7 +21,7 @@ from taichi_ants.rules.rule import Parameters, Rule, registered, words
 from taichi_ants.settings import Named, Setting, Settings, declared
 from taichi_ants.task import observations
 from taichi_ants.task.choice import Choice
-from taichi_ants.task.field import COMPASS, TRAIL, Field
+from taichi_ants.task.field import TRAIL, Field
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
@@ -33,7 +34,6 @@ _OF_CHOICE = {
     for setting in declared(Choice)
     if setting.rule.only and setting.name in Caste.__dataclass_fields__
 }
-_CUES = {"outbound_cue": (), "homing_cue": (COMPASS,)}  # with cues that are not pheromones
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Task(Settings, path="task"):
         "possible. Picking up takes food in view, and the ant turns around. Giving needs the queen "
         "in view.",
         "outbound_cue": "Ants without food see cells as T by the levels of `{outbound_cue}`.",
-        "homing_cue=compass": "With food, cells nearer to the queen of the ant are S.",
+        **{f"homing_cue={name}": f"With food, cells {c.words} are S." for name, c in CUES.items()},
         "homing_cue": "With food, cells are S by the levels of `{homing_cue}`.",
         "turns_at_queen": "An ant turns around after a delivery.",
         "delivery=terminates": "At a delivery, the target of an update is the reward alone.",
@@ -124,7 +124,8 @@ class Task(Settings, path="task"):
         str, Setting("pheromone that ants without food see as T: trail, or the name of a field")
     ] = TRAIL
     homing_cue: Annotated[
-        str, Setting("what ants with food see as S: compass, trail, or the name of a field")
+        str,
+        Setting(f"what ants with food see as S: {', '.join(CUES)}, trail, or the name of a field"),
     ] = COMPASS
     traffic: Annotated[Traffic, Setting("rules for entering a cell with an ant on it")] = Traffic()
     turns_at_queen: Annotated[bool, Setting("turn ants around after a delivery")] = False
@@ -150,7 +151,7 @@ class Task(Settings, path="task"):
         Setting(choices=partial(words, "reward")),
     ] = "by_event"
     rules: Annotated[
-        Named[Parameters], Setting("parameters of the rules that you wrote, by name")
+        Named[Parameters], Setting("parameters of rules that are functions, by name")
     ] = field(default_factory=Named)
 
     def check(self) -> None:
@@ -169,13 +170,13 @@ class Task(Settings, path="task"):
                 f"`task.choice.rule` is {choice.rule!r} and `task.noise.misread` "
                 f"{self.noise.misread}."
             )
-        if choice.carriers_follow is not None and self.homing_cue != COMPASS:
+        if choice.carriers_follow is not None and self.homing_cue not in CUES:
             yield (
                 f"`task.choice.carriers_follow` is {choice.carriers_follow!r}, but "
                 f"`task.homing_cue` is {self.homing_cue!r}, which ants with food follow already; "
                 "leave one of them out."
             )
-        for name in (TRAIL, COMPASS, ALL, NOTHING):  # the last two have a meaning in `lays`
+        for name in (TRAIL, *CUES, ALL, NOTHING):  # the last two have a meaning in `lays`
             if name in self.fields:
                 yield (
                     f"`task.fields` has a field {name!r}, but that name is taken; choose another "
@@ -226,10 +227,11 @@ class Task(Settings, path="task"):
         for rule in self.own_rules:
             for name in rule.fields:
                 yield f"a field that the rule {rule.name!r} reads", name
-        owners = {"task": self, **{f"task.castes.{n}": caste for n, caste in self.castes.items()}}
+        owners: dict[str, Any] = {f"task.castes.{n}": caste for n, caste in self.castes.items()}
+        owners["task"] = self
         for path, owner in owners.items():
-            for cue, more in _CUES.items():
-                yield f"`{path}.{cue}`", getattr(owner, cue), *more
+            yield f"`{path}.outbound_cue`", owner.outbound_cue
+            yield f"`{path}.homing_cue`", owner.homing_cue, *CUES
             if isinstance(owner, Caste):
                 for name in owner.pheromones_laid((TRAIL, *self.fields)):
                     yield f"a name in `{path}.lays`", name, ALL, NOTHING
@@ -277,8 +279,11 @@ class Task(Settings, path="task"):
 
     def cues_of(self, caste: Caste | None) -> tuple[int, int]:
         """Return the numbers of the outbound and the homing cue of a caste, or of the task."""
-        names = [getattr(caste, setting, None) or getattr(self, setting) for setting in _CUES]
-        return self.number_of(names[0]), self.number_of(names[1])
+        outbound, homing = (
+            getattr(caste, setting, None) or getattr(self, setting)
+            for setting in ("outbound_cue", "homing_cue")
+        )
+        return self.number_of(outbound), self.number_of(homing)
 
     def with_policies(self, policy: str) -> Task:
         """Return the task with another policy for the castes that have one."""
@@ -338,9 +343,14 @@ class Task(Settings, path="task"):
         pheromones = self.pheromone, *self.fields.values()
         return pheromones if falls else tuple(pheromone.lasting for pheromone in pheromones)
 
+    @property
+    def cues(self) -> tuple[str, ...]:
+        """The names of all cues by number: the trail, fields; others from -1, the compass."""
+        return (TRAIL, *self.fields, *reversed(CUES))
+
     def number_of(self, cue: str) -> int:
-        """Return the number of a pheromone: 0 for the trail, 1 for the first field; -1: compass."""
-        return -1 if cue == COMPASS else (TRAIL, *self.fields).index(cue)
+        """Return the number of a cue; those of pheromones are not negative."""
+        return self.cues.index(cue) - (len(self.cues) if cue in CUES else 0)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the task as names and numbers; `from_dict` reads it."""

@@ -137,7 +137,7 @@ class Panel {
     });
     const name = nameOf(pheromone), blind = !hides ? "" : own ? `where the ${name} is ${STRONGER[seenBy]}, the ant sees E`
       : `ants ${ant.loaded ? "with" : "without"} food do not see the ${name}`;
-    const means = { ...LETTERS, T: nameOf(cue), S: cue === "compass" ? "nearer to the queen" : nameOf(cue) };
+    const means = { ...LETTERS, T: nameOf(cue), S: header.senses[cue] ?? nameOf(cue) };
     const kinds = [...new Set(letters.map((letter) => letter[0]))], known = kinds.filter((kind) => means[kind]);
     const meanings = known.map((kind) => `${kind} ${means[kind]}`);
     const more = known.length < kinds.length || !kinds.length ? header.letters : "";
@@ -193,7 +193,7 @@ class Panel {
       const words = live ? early : "The recording ends here.";
       return `<div class="story"><span class="label">${words}</span></div>`;
     }
-    const cue = this.cueOf(ant), better = cue === "compass" ? "It moves nearer to the queen" : `It steps onto the ${nameOf(cue)}`;
+    const cue = this.cueOf(ant), sense = header.senses[cue], better = sense ? `It moves to a cell ${sense}` : `It steps onto the ${nameOf(cue)}`;
     const came = CAME[act.event] || better;
     const action = header.actions[act.action], worth = { 1: "up", "-1": "down" }[Math.sign(act.reward)] ?? "";
     const lines = [

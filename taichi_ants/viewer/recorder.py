@@ -17,12 +17,11 @@ from taichi_ants.engines.runs.results import Trace
 from taichi_ants.errors import AntsError, count, expect
 from taichi_ants.features import used_by
 from taichi_ants.features.castes import update_weights_of
+from taichi_ants.features.cues import CUES
 from taichi_ants.features.feature import Feature, Mark
 from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import colony_of_rollout, intervals
-from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
-from taichi_ants.task.events import Event
-from taichi_ants.task.field import COMPASS, TRAIL
+from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS, Event
 from taichi_ants.viewer.frames import pack, types_of
 from taichi_ants.viewer.page import Recording
 
@@ -103,7 +102,7 @@ class Recorder:
         ants = "Ants" if changes else count(colony.ants, "ant")
         is_own = task.choice.own_rule or not task.sees.encode.__module__.startswith("taichi_ants.")
         by_letters = colony.has_training and not is_own and not task.noise.misread
-        names = (TRAIL, *task.fields, COMPASS)  # the number of the compass is -1
+        names = task.cues
         few, seen = self._n_states <= _MOST_NAMES, np.flatnonzero(self._known) % self._n_states
         named = range(self._n_states) if few else np.unique(seen).tolist()
         return {
@@ -120,6 +119,7 @@ class Recorder:
                 }
                 for name, one in zip(names, colony.pheromones, strict=False)
             ],
+            "senses": {name: cue.words for name, cue in CUES.items()},  # what a better cell is
             "nests": colony.n_nests,
             "n_states": self._n_states,
             "names": {state: name_parts(task.sees, state) for state in named},

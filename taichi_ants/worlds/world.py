@@ -134,6 +134,10 @@ class World:
 
     def ground(self) -> np.ndarray:
         """Return EMPTY, OBSTACLE (also outside), FOOD or QUEEN by cell, uint8 (grid.size,)."""
+        return self._ground.copy()
+
+    @cached_property
+    def _ground(self) -> np.ndarray:
         ground = np.where(self.grid.exists, np.uint8(EMPTY), np.uint8(OBSTACLE))
         ground[self.grid.index(self.obstacles)] = OBSTACLE
         ground[self.grid.index(self.foods)] = FOOD
@@ -162,12 +166,7 @@ class World:
 
     def closer(self, nest: int = 0) -> np.ndarray:
         """Return bit h by cell, 1 if the neighbour at heading h is nearer to a queen (uint8)."""
-        distances = self._far(nest)
-        bits = np.zeros(self.grid.size, dtype=np.uint8)
-        for heading, offset in enumerate(self.grid.offsets.tolist()):
-            beyond = np.roll(distances, -offset)
-            bits |= (beyond < distances).astype(np.uint8) << np.uint8(heading)
-        return bits * self.grid.exists
+        return self.grid.closer_to(tuple(self.queens[nest].tolist()))
 
     def walkable(self, starts: np.ndarray) -> np.ndarray:
         """Return the empty cells within reach of empty cells in `starts`, bool (grid.size,)."""
@@ -236,7 +235,7 @@ class World:
             self.start(0)  # raises AntsError because there is no room
         distance = self.distances()[free]
         nearest = free[distance == distance.min()]
-        numbers = self.grid.number(self.grid.cells(nearest))
+        numbers = self.grid.number(nearest)
         words = stream_state(seeds[:, None], STREAM_START_CELL, numbers[None, :])
         headings = choose(stream_state(seeds, STREAM_START_HEADING, 0) >> np.uint64(32), N_HEADINGS)
         return nearest[words.argmin(axis=1)].astype(np.int32), headings.astype(np.int32)
@@ -293,10 +292,14 @@ def free_cells(
     index, n = np.flatnonzero(free), len(nests)
 
     def words(cells: np.ndarray) -> np.ndarray:
-        return stream_state(seed, STREAM_START_CELL, grid.number(grid.cells(cells)))
+        return stream_state(seed, STREAM_START_CELL, grid.number(cells))
 
     if where == "spread":
-        return index[np.argsort(words(index))[:n]]
+        order = words(index)
+        if n < len(order):  # sort only the smallest of perhaps millions; no two are equal
+            first = order < np.partition(order, n)[n]
+            index, order = index[first], order[first]
+        return index[np.argsort(order)]
     queues = []
     for queen in queens.tolist():
         distance = grid.distances(tuple(queen))[index]

@@ -8,7 +8,7 @@ from systems import numpy_runs
 
 from taichi_ants import Task, TrainingConfig, train, worlds
 from taichi_ants.engines.runs.training import trace_training
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import Event
 
 # They learn soon, so that deliveries and long episodes both occur.
 CONFIGS = [

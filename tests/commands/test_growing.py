@@ -111,7 +111,7 @@ def test_a_finished_sweep_grows_without_repeating_anything(kind, sweep, monkeypa
         (RUNS, ("episodes = 6", "episodes = 7"), "study lacks (episodes is 6 instead of 7"),
         (RUNS, ("[7, 2, 5, 1]", "[7, 2, 5]"), "seeds is [7, 2, 5, 1] instead of [7, 2, 5]"),
         (DRAWN, ("samples = 8", "samples = 4"), "training.learning_rate is [0."),
-        (DRAWN, ("samples", "design_seed = 1\nsamples"), "design.design_seed is 0 instead of 1"),
+        (DRAWN, ("samples", "design_seed = 1\nsamples"), "design_seed is 0 instead of 1"),
     ],
 )
 def test_what_contradicts_is_refused_by_name(text, change, words, sweep):

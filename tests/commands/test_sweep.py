@@ -182,7 +182,7 @@ WRONG = {
     "unknown": ("shaping =", "shapings =", ["rewards.shapings` is not a setting; choose shaping"]),
     "unknown key of the file": ("seeds =", "seds =", ["'seds' is not a setting", "choose seeds"]),
     "other kind": ("rollouts", "ants", ["'ants' is not a setting of a sweep of kind 'runs'"]),
-    "missing": ("discount = 0.9", "", ["training.discount is missing"]),
+    "missing": ("discount = 0.9", "", ["training.discount` is missing"]),
     "value": ("discount = 0.9", "discount = 1.9", ["discount` is 1.9"]),
     "twice": ("discount", "epsilon = 0.1\ndiscount", ["training.epsilon is in [vary]"]),
     "empty": ("[1, 0]", "[]", ["task.rewards.shaping cannot vary, or has no values"]),

@@ -13,8 +13,7 @@ from same_colonies import assert_equal
 from taichi_ants.envs.colony import ColonyWorlds
 from taichi_ants.envs.vector import Arguments
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.task.constants import N_ACTIONS, PICK_UP
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import N_ACTIONS, PICK_UP, Event
 from taichi_ants.worlds import paper
 
 N_WORLDS = 3

@@ -9,7 +9,7 @@ import bridge_report
 import numpy as np
 import pytest
 from bridge import crossings, point, task
-from bridge_report import BRIDGES, DESIGNS, LATE, WINDOWS, Design, late_shares
+from bridge_report import BRIDGES, CASES, LATE, WINDOWS, Case, late_shares
 from PIL import Image
 
 from taichi_ants import AntsError, Colony, TrainingConfig
@@ -72,7 +72,7 @@ def test_nobody_takes_the_short_branch_before_it_opens(opens: int) -> None:
     place, ticks = double_bridge(**BRIDGE), 602
     training = TrainingConfig("sarsa", 0.1, 0.9, epsilon=0.02, epsilon_decay=1.0)
     follow = {"sharing": "frozen", "q_values": trail_follower("queues"), "schedule": "by_world"}
-    colony = Colony(place, task(Design()), training, [3], 12, **follow)
+    colony = Colony(place, task(Case()), training, [3], 12, **follow)
     found = crossings(colony, BRIDGE, ticks, opens)
     before, after = found[: WINDOWS // 2].sum(axis=(0, 1, 3)), found[5:].sum(axis=(0, 1, 3))
     assert colony.ticks == ticks
@@ -85,7 +85,7 @@ def test_nobody_takes_the_short_branch_before_it_opens(opens: int) -> None:
 
 
 def test_colonies_learn_where_the_short_branch_lies_on_either_side(monkeypatch) -> None:
-    one = point(Design(), episodes=60, ticks=10)
+    one = point(Case(), episodes=60, ticks=10)
     assert one.pool == (double_bridge(aside=1), double_bridge(mirrored=True, aside=1))
     colony = Mock()  # notes the worlds in which it would learn
     monkeypatch.setattr(ColonyPoint, "colony", lambda *_, **__: colony)
@@ -105,7 +105,7 @@ def counts(seeds: int) -> dict:
     crossed[:, 0] = [[3], [1]]
     crossed[:, 1] = [[9], [1]]
     crossed[..., -1] = 0
-    return {design: dict.fromkeys(BRIDGES, crossed) for design in DESIGNS}
+    return {design: dict.fromkeys(BRIDGES, crossed) for design in CASES}
 
 
 @pytest.fixture
@@ -114,7 +114,7 @@ def found() -> dict:
 
 
 def test_late_shares_are_of_the_second_half(found: dict) -> None:
-    crossed = found[Design()][BRIDGES[0]].copy()
+    crossed = found[Case()][BRIDGES[0]].copy()
     crossed[: WINDOWS // 2, :, 0] = 1000
     shares = late_shares(crossed)
     np.testing.assert_allclose(shares[:, :2], [[0.75] * 2, [0.9] * 2])
@@ -137,7 +137,7 @@ def test_shares_after_a_late_opening() -> None:
     crossed[5:, 0, 1] = 10 - crossed[5:, 0, 0]
     crossed[:, 0, :, 0] = crossed[:, 0, ::-1, 0]  # this one ends with 10 %
     crossed[:, :, :, -1] = 0
-    text = bridge_report.report({Design(): {LATE: crossed}}, 3000)
+    text = bridge_report.report({Case(): {LATE: crossed}}, 3000)
     (foragers,) = [line for line in text.splitlines() if " foragers " in line]
     *means, low, high, colonies, of, all_of_them = foragers.split()[6:]
     assert means == ["17", "34", "50", "66", "83"]

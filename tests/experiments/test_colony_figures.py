@@ -12,7 +12,7 @@ from colony_findings import (
     QUEUES,
     RULES,
     ConditionRow,
-    Design,
+    Trained,
     condition_rows,
 )
 from matplotlib.axes import Axes
@@ -45,8 +45,8 @@ def dots(axis: Axes) -> dict[int, float]:
 @pytest.mark.parametrize(
     ("name", "designs"),
     [
-        ("rules", [Design(rules) for rules in RULES]),
-        ("elsewhere", [Design(rules, ABROAD) for rules in (PAPER, ABC, QUEUES)]),
+        ("rules", [Trained(rules) for rules in RULES]),
+        ("elsewhere", [Trained(rules, ABROAD) for rules in (PAPER, ABC, QUEUES)]),
     ],
 )
 def test_a_line_shows_the_largest_colony_of_a_design(rows, name, designs) -> None:

@@ -18,8 +18,8 @@ from colony_findings import (
     SILENT,
     SOME,
     A,
-    Design,
     Judged,
+    Trained,
     difference_rows,
     judge_all,
 )
@@ -98,24 +98,24 @@ def test_where_crowding_begins(each: dict[int, float], falls: str) -> None:
 
 
 # By question, the designs of each statement: the first delivers more than the second.
-PAIRS: dict[str, list[tuple[Design, Design]]] = {
+PAIRS: dict[str, list[tuple[Trained, Trained]]] = {
     ADDS: [
-        *((Design(ABC), Design(rules)) for rules in (PAPER, A, BC)),
-        (Design(QUEUES), Design(ABC)),
+        *((Trained(ABC), Trained(rules)) for rules in (PAPER, A, BC)),
+        (Trained(QUEUES), Trained(ABC)),
     ],
     TRAIL: [
-        (Design(PAPER), Design(SILENT)),
-        (Design(A), Design(PAPER)),
-        (Design(ABC), Design(ABC_SILENT)),
+        (Trained(PAPER), Trained(SILENT)),
+        (Trained(A), Trained(PAPER)),
+        (Trained(ABC), Trained(ABC_SILENT)),
     ],
     TRAINING: [
-        (Design(PAPER), Design(PAPER, ALONE)),
-        *((Design(ABC), Design(ABC, regime)) for regime in (ALONE, FEW, SOME)),
+        (Trained(PAPER), Trained(PAPER, ALONE)),
+        *((Trained(ABC), Trained(ABC, regime)) for regime in (ALONE, FEW, SOME)),
     ],
     ELSEWHERE: [
-        (Design(ABC), Design(ABC, ABROAD)),
-        (Design(ABC, ABROAD), Design(PAPER, ABROAD)),
-        (Design(QUEUES, ABROAD), Design(ABC, ABROAD)),
+        (Trained(ABC), Trained(ABC, ABROAD)),
+        (Trained(ABC, ABROAD), Trained(PAPER, ABROAD)),
+        (Trained(QUEUES, ABROAD), Trained(ABC, ABROAD)),
     ],
 }
 
@@ -164,7 +164,7 @@ def test_seeds_are_paired() -> None:
     (findings,) = [
         findings
         for (_, series), findings in judge_all(study).items()
-        if (series.first, series.second) == (Design(ABC), Design(PAPER))
+        if (series.first, series.second) == (Trained(ABC), Trained(PAPER))
     ]
     assert {finding.verdict for finding in findings.values()} == {Verdict.SUPPORTED}
 

@@ -10,7 +10,7 @@ import own_rules
 
 from taichi_ants import rules
 from taichi_ants.rules.rule import RULES
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import Event
 
 
 def golden_alarm(level, level_trail, threshold, stimulus, carries, amount=30.0):

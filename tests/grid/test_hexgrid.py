@@ -121,4 +121,4 @@ def test_offsets_are_steps_and_the_border_is_void(world_ranges: tuple) -> None:
 def test_numbers_count_the_cells_in_lexicographic_order(world_ranges: tuple) -> None:
     grid = AxialGrid(world_ranges)
     cells_there = sorted(map(tuple, grid.cells(np.flatnonzero(grid.exists)).tolist()))
-    assert grid.number(cells_there).tolist() == list(range(grid.count))
+    assert grid.number(grid.index(cells_there)).tolist() == list(range(grid.count))

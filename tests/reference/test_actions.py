@@ -10,8 +10,7 @@ import pytest
 from colonies import GAMMA, act, begun, load
 
 from taichi_ants.task import Pheromone, Rewards
-from taichi_ants.task.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT, Event
 from taichi_ants.worlds.world import World
 
 A, L, M, R = (0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)

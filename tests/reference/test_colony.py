@@ -7,8 +7,7 @@ from colonies import act, begun, load, training
 
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Task
-from taichi_ants.task.constants import GIVE
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import GIVE, Event
 from taichi_ants.worlds import World
 
 

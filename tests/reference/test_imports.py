@@ -14,7 +14,6 @@ ALLOWED = {
     "taichi_ants.task",
     "taichi_ants.grid.constants",
     "taichi_ants.task.constants",
-    "taichi_ants.task.events",
     "taichi_ants.errors",
     # Your own rules and observations, and the form of their inputs.
     "taichi_ants.rules",

@@ -90,7 +90,7 @@ def differing(task):
             for one in declared(type(entries)):
                 usual[f"task.{name}.{entry}.{one.name}"] = getattr(entries, one.name)
     own = flat({"task": task.as_dict()})
-    return {name: value for name, value in own.items() if value != usual[name]}
+    return {name: value for name, value in own.items() if name not in usual or value != usual[name]}
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -27,7 +27,7 @@ from taichi_ants.interventions import SetTask
 from taichi_ants.reference import observations as twins
 from taichi_ants.rules import pick
 from taichi_ants.rules.inputs import KINDS
-from taichi_ants.rules.rule import RULES
+from taichi_ants.rules.rule import RULES, words
 from taichi_ants.task import Choice, Observation, observations
 from taichi_ants.task.model import Model
 from taichi_ants.task.observations import observation as seen
@@ -267,6 +267,15 @@ def test_parameters_change_without_other_kernels_and_in_an_episode(clean):
     assert colony.deliveries == plain.deliveries
     assert np.array_equal(colony.snapshot().trail, plain.snapshot().trail)
     assert colony.deliveries[0] > 0
+
+
+def test_a_built_in_function_is_listed_before_yours_and_stays(clean, monkeypatch):
+    rules.register("evaporation")(same)
+    monkeypatch.setattr(RULES, "built_in", {"same": RULES.yours.pop("same")})
+    assert words("evaporation") == ("linear", "exponential", "none", "same", "power_law")
+    assert Task(pheromone=Pheromone("same")).pheromone.own_evaporation is rules.get("same")
+    with pytest.raises(AntsError, match=r"^'same' is the name of a built-in rule"):
+        rules.register("evaporation")(same)
 
 
 def wrong_twin(level):

@@ -7,7 +7,7 @@ from typing import Annotated
 from taichi_ants import rules
 from taichi_ants.rules import exp, log, pick, power
 from taichi_ants.settings import Setting
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import Event
 
 HIGHEST = 1000
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from taichi_ants.reference.ants import Transition
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import Event
 
 
 def transition(

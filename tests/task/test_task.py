@@ -11,6 +11,7 @@ from random_rewards import random_rewards
 
 from taichi_ants import At
 from taichi_ants.errors import AntsError
+from taichi_ants.features.cues import CUES
 from taichi_ants.task import (
     Choice,
     Field,
@@ -99,6 +100,7 @@ def castes(**settings):
     return lambda: Task(castes={"a": settings})
 
 
+SENSES = ", ".join(CUES)
 UNLESS, UNKNOWN, ADD = (
     "; leave it out unless `",
     "is not a setting; choose ",
@@ -118,7 +120,7 @@ REFUSED = [
     (lambda: Noise(slip=1.5), "task.noise.slip` is 1.5; it must be between 0 and 1."),
     (lambda: Task(choice=CELLS, homing_cue="trail"), "which ants with food follow already"),
     (lambda: Task("ants", choice="deneubourg"), "task.observation` is 'ants'; it must be 'paper'"),
-    (lambda: Task(homing_cue="hoem"), f"is 'hoem'; it must be one of compass, trail, {ADD}"),
+    (lambda: Task(homing_cue="hoem"), f"is 'hoem'; it must be one of {SENSES}, trail, {ADD}"),
     (lambda: Task(outbound_cue="compass"), f"is 'compass'; it must be one of trail, {ADD}"),
     *(
         (lambda name=name: Task(fields={name: {}}), f"has a field {name!r}, but that name is taken")
@@ -140,7 +142,7 @@ REFUSED = [
     (castes(share=1, ants=2), "task.castes.a.ants` is 2, but `share` is 1.0; give one of them."),
     (castes(k=2), "because `task.choice.rule` is 'greedy'"),
     (castes(lays="trail, home"), f"'home'; it must be one of all, none, trail, {ADD}"),
-    (castes(homing_cue="home"), f"is 'home'; it must be one of compass, trail, {ADD}"),
+    (castes(homing_cue="home"), f"is 'home'; it must be one of {SENSES}, trail, {ADD}"),
 ]
 
 

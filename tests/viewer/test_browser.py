@@ -14,8 +14,7 @@ from taichi_ants import Colony, Task, TrainingConfig, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
 from taichi_ants.task import Life, Pheromone, foraging
-from taichi_ants.task.constants import ACTION_NAMES
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import ACTION_NAMES, Event
 from taichi_ants.viewer import Recording, page, record_colony, record_trace
 
 pytestmark = pytest.mark.browser

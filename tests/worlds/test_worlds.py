@@ -13,6 +13,7 @@ from taichi_ants.reference.ants import starts
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds import World
 from taichi_ants.worlds.world import STARTS as WHERE
+from taichi_ants.worlds.world import free_cells
 
 
 def small(**changes: object) -> World:
@@ -83,6 +84,13 @@ def test_ants_start_around_the_queen_or_anywhere() -> None:
     assert far.mean() == pytest.approx(world.distances()[world.grid.exists].mean(), rel=0.1)
     with pytest.raises(AntsError, match="where is 'moon'; it must be one of nest, spread"):
         world.start(1, 2, "moon")
+
+
+@pytest.mark.parametrize("where", WHERE)
+def test_no_ants_need_no_free_cell(where: str) -> None:
+    world = small()
+    full, none = np.zeros(world.grid.size, bool), np.zeros(0, int)
+    assert not len(free_cells(world.grid, full, world.queens, none, 0, where))
 
 
 @st.composite

@@ -30,6 +30,7 @@ from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.errors import AntsError, as_array, count
+from taichi_ants.features.cues import arrays_of
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_INTERVENTION
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
@@ -237,8 +238,9 @@ class _World:
                 self._lay(cells, 0, pheromone)
         if what == QUEEN:
             self.queen_cells[number] = cells[0]
-            closer = World(grid.ranges, grid.cells(cells[0]).tolist()).closer()
-            self.view("closer").reshape(colony.n_nests, -1)[number] = closer
+            world = World(grid.ranges, grid.cells(cells[0]).tolist())
+            for name, make in arrays_of(colony.model.senses).items():
+                self.view(name).reshape(colony.n_nests, -1)[number] = make(world, 0)
         if what == FOOD and colony.n_kinds > 1:
             self.view("kind_of")[cells] = number
         if what == FOOD and colony.task.has_loads:
@@ -450,7 +452,8 @@ class Interventions:
             colony.ants,
         ]
         rest += [self.ants, streams, colony.task.as_dict(), colony.training.as_dict()]
-        arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer")}
+        maps = arrays_of(colony.model.senses)
+        arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", *maps)}
         arrays |= {f"start {w}": start for w, start in enumerate(self.starts)}
         digest = hashlib.sha256(files.to_json(rest).encode())
         for name, array in sorted(arrays.items()):

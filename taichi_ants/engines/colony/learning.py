@@ -20,8 +20,7 @@ from taichi_ants.engines.colony.layout import TOUCHED_LINE, CasteRow, Stage, Sum
 from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.learners import model
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
-from taichi_ants.task.constants import BEST_AT, N_ACTIONS, ROW
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import BEST_AT, N_ACTIONS, ROW, Event
 from taichi_ants.task.rules.actions import step_end, terminates
 from taichi_ants.task.rules.policy import best_actions
 

@@ -15,8 +15,7 @@ from taichi_ants.engines.colony.learning import reset_slot
 from taichi_ants.engines.colony.steps import tally
 from taichi_ants.engines.colony.views import ant_view, nest_view
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
-from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, OBSTACLE, QUEEN
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, OBSTACLE, QUEEN, Event
 from taichi_ants.task.rules.policy import bit_number
 
 

@@ -39,6 +39,7 @@ from taichi_ants.engines.colony.layout import (
 from taichi_ants.engines.layout import compass_of, note_best_actions
 from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole
 from taichi_ants.features import arrays
+from taichi_ants.features.cues import arrays_of
 from taichi_ants.features.feature import ANT, CASTE, NEST, Array
 from taichi_ants.features.foods import food_numbers
 from taichi_ants.features.support import COLONY
@@ -50,8 +51,7 @@ from taichi_ants.learners.learner import Memory
 from taichi_ants.learners.policies import check_finite, checked_values, frozen_policy
 from taichi_ants.records import Snapshot, same
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW, Event
 from taichi_ants.task.field import TRAIL
 from taichi_ants.task.model import Model
 from taichi_ants.worlds.world import Start, World
@@ -634,15 +634,17 @@ class ColonyState:
         return settings
 
     def ground_constants(self) -> Arrays:
-        """Return the constants that depend on rocks and the queen."""
+        """Return the constants that depend on the world."""
         return {
             # 1 for rocks and outside.
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
-            # By cell: a bit for each heading that leads nearer to the queen.
-            "closer": self._of_each(
-                lambda world: [world.closer(nest) for nest in range(world.n_nests)]
-            ).reshape(-1),
+            **{name: self._maps(make) for name, make in arrays_of(self.model.senses).items()},
         }
+
+    def _maps(self, make: Callable[[World, int], Any]) -> np.ndarray:
+        """Return an array of a cue that is not a pheromone, by world, nest and cell."""
+        maps = self._of_each(lambda world: [make(world, nest) for nest in range(world.n_nests)])
+        return maps.reshape(-1)
 
     def _of_each(self, make: Callable[[World], Any]) -> np.ndarray:
         """Return an array for each world, made once for equal worlds."""

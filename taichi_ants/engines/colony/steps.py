@@ -26,12 +26,12 @@ from taichi_ants.engines.colony.layout import ANT_GROUND, ANT_STANDS, TALLY_WIDT
 from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
 from taichi_ants.engines.colony.views import ant_view
 from taichi_ants.engines.views import fill_codes
+from taichi_ants.features.cues import CUES
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task import constants
-from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, RIGHT
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, RIGHT, Event
 from taichi_ants.task.field import OCCASIONS
 from taichi_ants.task.rules import actions, conflicts, policy, vision
 
@@ -100,8 +100,8 @@ def see(c, v, cues, w, ant, tick):
     ground_right = looks_of(c, v, right, queen)
     paper_state = 0
     if trait(c.carries, ant) == 1:
-        if ti.static(cues.has_compass):
-            nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
+        if ti.static(cues.has_sense):
+            nearer = vision.nearer_from(better_around(c, v, cues, w, ant), heading)
             paper_state = vision.paper_state_carrying(
                 ground_left, ground_forward, ground_right, nearer
             )
@@ -157,7 +157,7 @@ def strongest_cue(c, v, cues, carries, here, heading, tick):
     right = here + actions.step_towards(c.compass, heading, RIGHT)
     outbound = ti.static(v.field(c, cues.outbound))
     level = ti.cast(strongest_of(c, outbound, left, forward, right, tick), v.level_type)
-    if ti.static(not cues.has_compass):
+    if ti.static(not cues.has_sense):
         field = ti.static(v.field(c, cues.followed))
         homing = ti.cast(strongest_of(c, field, left, forward, right, tick), v.level_type)
         level = ti.select(carries == 1, homing, level)
@@ -168,7 +168,7 @@ def strongest_cue(c, v, cues, carries, here, heading, tick):
 def view_around(c, v, cues, w, ant, carries, tick):
     """Return the view of an ant with food (`carries` is 1) or without."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
-    nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
+    nearer = vision.nearer_from(better_around(c, v, cues, w, ant), heading)
     queen = own_queen(c, v, w, ant)
     view = v.view_type(carries=carries, own_level=cue_level(c, v, cues, carries, here, tick))
     cells = ti.static(v.observation.cells)
@@ -183,7 +183,7 @@ def view_around(c, v, cues, w, ant, carries, tick):
             ours = held & ANT_STANDS == ANT_STANDS - nest_of(c, v, ant)
             view.ants[k] = ti.select(ours, 1 + (held >> 3), 0)
             view.other_nest_ants[k] = ti.cast((held != 0) & (not ours), ti.i32)
-        if ti.static(cues.has_compass):
+        if ti.static(cues.has_sense):
             view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
         else:
             view.nearer[k] = ti.cast(view.levels[k] > view.own_level, ti.i32)
@@ -249,10 +249,10 @@ def own_queen(c, v, w, ant):
     return queen
 
 
-@function
-def own_map(c, v, w, ant):
-    """Return the place of an ant's cell in the map of its nest in `closer`."""
-    return (w * v.n_nests + nest_of(c, v, ant)) * c.size + c.cell[ant]
+@while_compiling
+def better_around(c, v, cues, w, ant):
+    """Return a bit for each heading: 1 if the homing cue, not a pheromone, is better there."""
+    return CUES[cues.sense].better(ant_view(c, v, w, ant)) if cues.sense else 0
 
 
 @function
@@ -332,11 +332,11 @@ def cell_ahead(c, v, cues, w, ant, state, paper_state, i: ti.template()):
     code = vision.code_in_view(state, i)
     is_true = code == vision.code_in_view(paper_state, i)
     opens = ti.cast(actions.is_open(code), ti.i32)
-    nears = ti.cast(code == constants.SEES_CUE, ti.i32) & ti.static(int(cues.has_compass))
+    nears = ti.cast(code == constants.SEES_CUE, ti.i32) & ti.static(int(cues.has_sense))
     index = w * c.size + c.cell[ant] + actions.step_towards(c.compass, heading, i)
     if is_true & (c.ground[index] >> 4 != 0):  # an ant stands there
-        nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
-        nears = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(cues.has_compass))
+        nearer = vision.nearer_from(better_around(c, v, cues, w, ant), heading)
+        nears = nearer >> ti.static((i - 1) % N_HEADINGS) & 1
         if ti.static(v.traffic.shared):
             if holds_nestmate(c, v, ant, index):
                 opens = 1 if ti.static(v.traffic.follow) else carries
@@ -506,9 +506,9 @@ def is_better(c, v, cues, w, ant, ahead, here, tick):
     """Return whether the cell ahead of an ant is better than its own cell, by its cues."""
     better = is_stronger(ti.static(v.field(c, cues.outbound)), ahead, here, tick)
     if trait(c.carries, ant) == 1:
-        if ti.static(cues.has_compass):
-            closer = ti.cast(c.closer[own_map(c, v, w, ant)], ti.i32)
-            better = closer >> trait(c.heading, ant) & 1 == 1
+        if ti.static(cues.has_sense):
+            bits = ti.cast(better_around(c, v, cues, w, ant), ti.i32)
+            better = bits >> trait(c.heading, ant) & 1 == 1
         else:
             better = is_stronger(ti.static(v.field(c, cues.followed)), ahead, here, tick)
     return better

@@ -11,8 +11,7 @@ from collections import namedtuple
 import taichi as ti
 
 from taichi_ants.engines.colony.columns import function
-from taichi_ants.task.constants import EMPTY, OBSTACLE, PICK_UP
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import EMPTY, OBSTACLE, PICK_UP, Event
 from taichi_ants.task.field import Occasion
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rules import pheromone, vision

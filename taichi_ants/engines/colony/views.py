@@ -9,11 +9,12 @@ from taichi.lang.impl import subscript
 from taichi_ants.engines.colony import columns
 from taichi_ants.engines.colony.layout import COLUMNS, NestRow, WorldRow
 from taichi_ants.features import numbers_of_castes
+from taichi_ants.features.cues import CUES
 from taichi_ants.features.feature import ANT, CASTE, NEST
 from taichi_ants.kernel_functions import Named, while_compiling
 from taichi_ants.task.model import Model
 
-WORLD = "world"
+WORLD, MAP = "world", "map"
 
 
 def entries_of(model: Model) -> dict[str, tuple[str, str, int | None]]:
@@ -29,6 +30,7 @@ def entries_of(model: Model) -> dict[str, tuple[str, str, int | None]]:
         **{row.name.lower(): ("nests", NEST, row) for row in NestRow},
         **{name: ("castes", CASTE, row) for row, name in enumerate(of_castes)},
         **{array.name: (array.name, array.per, None) for array in arrays},
+        **{name: (name, MAP, None) for cue in CUES.values() for name in cue.arrays},
     }
 
 
@@ -37,7 +39,8 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
 
     An attribute is an entry of an array, which can be assigned: by the slot of the ant, or by its
     nest, world or caste. `task` has the settings that features declare as numbers, for example
-    `task.labour.demand`. Other names are those of the arrays and numbers of kernels.
+    `task.labour.demand`, and `place` is the index of the ant's cell in arrays by cell. Other names
+    are those of the arrays and numbers of kernels.
     """
 
     def index(per: str) -> Any:
@@ -45,6 +48,8 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
             return w
         if per == ANT:
             return ant
+        if per == MAP:
+            return columns.own_map(c, v, w, ant)
         if per == CASTE:
             return columns.trait(c.caste, ant)
         number = columns.nest_of(c, v, ant) if nest is None else nest
@@ -58,6 +63,8 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None) -> Named:
     def read(name: str) -> Any:
         if name == "task":
             return Named(group)
+        if name == "place":
+            return w * c.size + subscript(None, c.cell, ant)
         if name not in v.entries:
             return getattr(c, name)
         array, per, row = v.entries[name]

@@ -28,8 +28,7 @@ from taichi_ants.features import hooks_at
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
-from taichi_ants.task.constants import ROW
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import ROW, Event
 from taichi_ants.task.rules.actions import step_end
 from taichi_ants.task.rules.policy import chance_of, chance_of_softly, choose, choose_softly
 

@@ -21,8 +21,7 @@ from taichi_ants.measures.finished import counts_of_lone_ant, of_lone_ants
 from taichi_ants.measures.tidy import Measured, Tidy
 from taichi_ants.records import Record
 from taichi_ants.task import Task
-from taichi_ants.task.constants import N_ACTIONS, ROW
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import N_ACTIONS, ROW, Event
 from taichi_ants.worlds.world import World
 
 _KIND = Kind("training result", 7, "TrainingResult.save", sealed=True)

@@ -24,8 +24,7 @@ from taichi_ants.engines.runs.step import (
     restore,
 )
 from taichi_ants.features import hooks_at
-from taichi_ants.task.constants import PICK_UP
-from taichi_ants.task.events import Event, Reason
+from taichi_ants.task.constants import PICK_UP, Event, Reason
 from taichi_ants.task.rules.actions import step_end
 from taichi_ants.task.rules.pheromone import FADING
 from taichi_ants.task.rules.policy import choose_from_masks

@@ -14,8 +14,7 @@ from taichi_ants.features.feature import Feature
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.kernel_functions import Named, while_compiling
 from taichi_ants.task import Task
-from taichi_ants.task.constants import FOOD, FORWARD, LEFT, PICK_UP, QUEEN, RIGHT
-from taichi_ants.task.events import Event, Reason
+from taichi_ants.task.constants import FOOD, FORWARD, LEFT, PICK_UP, QUEEN, RIGHT, Event, Reason
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules import vision
 from taichi_ants.task.rules.actions import (

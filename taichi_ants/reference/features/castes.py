@@ -9,10 +9,12 @@ from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.random_stream import WORDS, RandomStream, stream_state
 from taichi_ants.task import Caste, Task
 
+ONE = Caste()  # without settings; made once, because it takes long
+
 
 def caste_of(task: Task, ant: Ant) -> Caste:
     """Return the caste of an ant, one without settings if there are no castes."""
-    return [*task.castes.values()][ant.caste] if task.castes else Caste()
+    return [*task.castes.values()][ant.caste] if task.castes else ONE
 
 
 def parts_of(castes: Sequence[Caste], nest: int) -> list[tuple[int, float]]:

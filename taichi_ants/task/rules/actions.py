@@ -7,8 +7,7 @@ delivery ends an episode.
 import taichi as ti
 
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.constants import FORWARD, GIVE, LEFT, RIGHT
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import FORWARD, GIVE, LEFT, RIGHT, Event
 from taichi_ants.task.rules.vision import goals_in_view
 
 # A compass is an i32 array of 294 entries. First, at h, h + 1 and h + 2, are the index steps to the

@@ -16,7 +16,7 @@ from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import Event
 
 # The mark of an ant (u8): 0 for nothing, ENTER or TAKE plus a heading. If ants can enter cells with
 # ants, an ant that wants nothing has the mark STANDS, so that every ant has one.

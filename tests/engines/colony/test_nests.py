@@ -15,8 +15,7 @@ from taichi_ants.learners.policies import trail_follower
 from taichi_ants.protocol import At
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Food
-from taichi_ants.task.constants import FOOD
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import FOOD, Event
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
 KINDS = {"seed": Food(pick_up=2, deliver=5, loads=3), "sugar": Food(deliver=20)}

@@ -16,7 +16,7 @@ from random_worlds import random_world
 from taichi_ants import TrainingConfig, evaluate, learners, rollout, trace_training, train
 from taichi_ants.settings import declared
 from taichi_ants.task import Task, observations
-from taichi_ants.task.events import Event
+from taichi_ants.task.constants import Event
 from taichi_ants.worlds import paper
 
 DELIVERIES = ("terminates", "truncates")

@@ -12,8 +12,7 @@ from taichi_ants import Life, Pheromone, Task
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.task.constants import GIVE, PICK_UP
-from taichi_ants.task.events import Event, Reason
+from taichi_ants.task.constants import GIVE, PICK_UP, Event, Reason
 from taichi_ants.worlds import World, from_text
 
 # Each is a kernel of its own: observation, deposit, view.

@@ -1,0 +1,63 @@
+"""Build colony.wasm and ant.wasm from C, with clang and lld: python lab/engine/build.py
+
+It also writes the tables of lab/page/worlds.js from the package: the worlds, and the best actions
+of the hand-written policy.
+
+The files are committed, with their checksums and the compiler in built.json, so that a page needs
+no compiler. Other compilers make other bytes with the same results, which tests compare.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.worlds import lab
+
+ENGINE = Path(__file__).resolve().parent
+WORLDS = ENGINE.parent / "page" / "worlds.js"
+SOURCES = {"colony.wasm": "page.c", "ant.wasm": "ant_page.c"}
+FLAGS = (
+    *("-O3", "-std=c11", "-ffp-contract=off", "-fno-vectorize", "-fno-slp-vectorize"),
+    *("-fvisibility=hidden", "-Wall", "-Wno-unknown-pragmas", "-Wno-unused-function"),
+)
+WASM = (
+    *("--target=wasm32", "-nostdlib", "-ffreestanding", "-mbulk-memory", "-msimd128"),
+    *("-isystem", str(ENGINE / "wasm"), "-Wl,--no-entry", "-Wl,--export-dynamic"),
+    *("-Wl,--strip-all", "-Wl,-z,stack-size=65536"),
+)
+
+
+def build(folder: Path = ENGINE, clang: str = "clang") -> dict[str, str]:
+    """Write the .wasm files into a folder, and return their SHA-256 by name, and the compiler."""
+    built = {}
+    for name, source in SOURCES.items():
+        subprocess.run([clang, *FLAGS, *WASM, "-o", folder / name, ENGINE / source], check=True)
+        built[name] = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+    version = subprocess.run([clang, "--version"], capture_output=True, text=True, check=True)
+    return {"compiler": version.stdout.splitlines()[0], **built}
+
+
+def with_tables(script: str) -> str:
+    """Return worlds.js with the present tables of the package."""
+    begin, end = script.index("/* GENERATED */\n"), script.index("/* END */\n")
+    lines = [f"const LAB = {Path(lab.__file__).with_suffix('.json').read_text('utf-8').strip()};"]
+    # A letter for each state: its best actions are the bits of its place after "@".
+    lines.append("export const FOLLOWERS = {")
+    for observation in ("paper", "ants", "queues"):
+        rows = trail_follower(observation)
+        letters = "".join(chr(64 + sum(1 << int(a) for a in row.nonzero()[0])) for row in rows)
+        lines.append(f"  {len(rows)}: {json.dumps(letters)},")
+    return script[:begin] + "\n".join(["/* GENERATED */", *lines, "};", ""]) + script[end:]
+
+
+if __name__ == "__main__":
+    facts = build(clang=sys.argv[1] if len(sys.argv) > 1 else "clang")
+    (ENGINE / "built.json").write_text(json.dumps(facts, indent=2) + "\n")
+    WORLDS.write_text(with_tables(WORLDS.read_text("utf-8")), "utf-8")
+    for name in SOURCES:
+        print(f"{name}: {(ENGINE / name).stat().st_size} bytes")

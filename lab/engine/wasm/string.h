@@ -1,0 +1,3 @@
+/* Instructions of WebAssembly with -mbulk-memory. */
+#define memcpy __builtin_memcpy
+#define memset __builtin_memset

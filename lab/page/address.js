@@ -1,0 +1,106 @@
+/* address.js: the address holds the scene, the seed and every stroke, so that a link replays a visit to the bit. */
+
+import { byId } from "./controls.js";
+import { decode, encode, linkOf, partsOf } from "./link.js";
+import { QUESTIONS } from "./scenes.js";
+import { many } from "./story.js";
+
+const SAVE_MS = 250;
+const DAMAGED = "This link is damaged. The lab starts anew.";
+const MOST_REPLAY = 200_000; // ticks of a link that are replayed at once
+
+/** The text after "#" that replays the runs up to now; two runs are joined by "~". */
+export const visitOf = (runs) => runs.map((run) => linkOf(run.engine)).join("~");
+
+const withoutMoment = (runs) => runs.map(({ engine }) => encode(engine.first, engine.events)).join("~");
+
+function show(text) {
+  try { history.replaceState(null, "", `#${text}`); } catch { /* a frame without an address of its own */ }
+}
+
+async function copied(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    return false;
+  }
+}
+
+export class Address {
+  constructor(lab) {
+    this.lab = lab;
+    byId("copy").addEventListener("click", () => this.copy());
+    byId("verify").addEventListener("click", () => this.verify());
+    addEventListener("hashchange", () => this.open());
+  }
+
+  /** Write what has happened into the address, soon. */
+  save() {
+    clearTimeout(this.saving);
+    this.saving = setTimeout(() => show(withoutMoment(this.lab.runs)), SAVE_MS);
+  }
+
+  /** Write a name into the address: of a question, or of the daily map. */
+  name(id) {
+    clearTimeout(this.saving);
+    show(id);
+  }
+
+  async copy() {
+    const text = visitOf(this.lab.runs);
+    show(text);
+    const done = await copied(`${location.href.split("#")[0]}#${text}`);
+    const { tick } = this.lab.runs[0];
+    this.lab.toast(done ? `Link copied: ${many(text.length)} characters. It replays these ${many(tick)} ticks to the same state.`
+      : `The address holds it now, ${many(text.length)} characters. Copy it from there.`, 5000);
+  }
+
+  /** Three lines of Python that replay the right run, and print the state that the page shows. */
+  async verify() {
+    const run = this.lab.runs[this.lab.runs.length - 1], text = linkOf(run.engine);
+    const lines = `from taichi_ants import replay\nvisit = replay("${text}")\nprint(visit.hash)  # ${run.engine.hash()}`;
+    const done = await copied(lines);
+    this.lab.toast(done ? `Three lines of Python copied. They print ${run.engine.hash()}, the state at tick ${many(run.tick)}.`
+      : "This browser does not let the page copy. The link in the address verifies as well.", 6000);
+    return lines;
+  }
+
+  /** Open what the address asks for. Return whether it asked for anything. */
+  open(text = location.hash.slice(1)) {
+    const { lab } = this;
+    if (!text) return false;
+    const question = QUESTIONS.find((one) => one.id === text);
+    if (question) return lab.ask(question) || true;
+    if (text === "daily") return lab.daily.begin() || true;
+    let starts;
+    try {
+      starts = text.split("~").slice(0, 2).map((one) => {
+        const { code, tick, hash } = partsOf(one), { scene, events } = decode(code);
+        return { scene, events, tick, hash };
+      });
+    } catch (error) {
+      lab.begin();
+      lab.toast(error instanceof URIError ? DAMAGED : error.message, 6000);
+      return true;
+    }
+    lab.begin(starts);
+    this.replay(starts);
+    return true;
+  }
+
+  /** Play a link up to its moment, and compare the state. */
+  replay(starts) {
+    const { lab } = this, began = performance.now();
+    if (starts.some(({ tick }) => tick === null || tick > MOST_REPLAY)) {
+      if (starts[0].events.length) lab.toast("This link plays what was drawn.", 5000);
+      return;
+    }
+    lab.runs.forEach((run, k) => run.skip(starts[k].tick));
+    const ms = Math.round(performance.now() - began), wrong = lab.runs.filter((run, k) => starts[k].hash && run.engine.hash() !== starts[k].hash);
+    this.replayed = { equal: !wrong.length, ms };
+    lab.toast(wrong.length ? `Replayed ${many(starts[0].tick)} ticks, but the state differs: it is ${wrong[0].engine.hash()}.`
+      : `Replayed ${many(starts[0].tick)} ticks in ${many(ms)} ms: the same state, to the last bit.`, 6000);
+    lab.controls.show();
+  }
+}

@@ -1,0 +1,109 @@
+/* brush.js: drawing into the world, by pointer, touch or keyboard; and picking an ant with the eye. */
+
+import { STEPS } from "./engine.js";
+import { cellAt, centre } from "./geometry.js";
+
+const KEYS = { ArrowUp: 0, ArrowDown: 3 };
+const SIDEWAYS = { ArrowRight: [1, 2], ArrowLeft: [4, 5] }; // in turn, so that the brush keeps its row
+const NEAR = 3.5; // of an ant that is picked, in the unit of geometry.js
+
+/**
+ * A stroke is a path of adjacent cells. What is drawn between two frames is one event, and the next event goes on
+ * with the cell after it.
+ */
+export class Brush {
+  /** @param {any} lab  @param {{canvas: HTMLCanvasElement, painter: import("./draw.js").Painter, run: any}} side */
+  constructor(lab, side) {
+    this.lab = lab;
+    this.side = side;
+    this.end = -1;   // the last cell of the stroke
+    this.fresh = []; // cells that are not applied yet
+    this.even = false;
+    const on = (name, act) => side.canvas.addEventListener(name, act);
+    on("pointerdown", (event) => this.press(event));
+    on("pointermove", (event) => this.move(event));
+    for (const name of ["pointerup", "pointercancel"]) on(name, (event) => this.lift(event));
+    on("pointerleave", () => { if (!lab.ui.down) lab.ui.pointer = null; });
+    on("keydown", (event) => this.key(event));
+    on("focus", () => { lab.ui.focused = side.canvas.matches(":focus-visible"); });
+    on("blur", () => { [lab.ui.focused, lab.ui.pointer] = [false, null]; this.lift(); });
+  }
+
+  press(event) {
+    if (event.button) return;
+    const { ui } = this.lab;
+    this.side.canvas.setPointerCapture(event.pointerId);
+    ui.focused = false;
+    ui.pointer = cellAt(...this.side.painter.under(event));
+    if (ui.brush === "look") this.pick(this.side.painter.under(event));
+    else this.lower();
+  }
+
+  move(event) {
+    const { ui } = this.lab;
+    ui.pointer = cellAt(...this.side.painter.under(event));
+    if (!ui.down) return;
+    const moves = event.getCoalescedEvents ? event.getCoalescedEvents() : [];
+    for (const one of moves.length ? moves : [event]) this.drawTo(cellAt(...this.side.painter.under(one)));
+  }
+
+  lower() {
+    if (!this.lab.mayDraw()) return;
+    this.lab.ui.down = true;
+    this.end = -1;
+    this.drawTo(this.lab.ui.pointer);
+    this.flush();
+  }
+
+  lift(event) {
+    this.flush();
+    this.lab.ui.down = false;
+    if (event && event.pointerType === "touch") this.lab.ui.pointer = null;
+  }
+
+  /** Extend the stroke to a cell, along a straight line, as far as the world goes. */
+  drawTo([q, r]) {
+    const { engine } = this.side.run;
+    if (!engine.exists(q, r)) return;
+    const cell = engine.at(q, r);
+    this.fresh.push(...(this.end < 0 ? [cell] : engine.line(this.end, cell).slice(1)));
+    this.end = cell;
+  }
+
+  /** Apply what was drawn since the last frame. */
+  flush() {
+    const { lab, fresh } = this;
+    if (!fresh.length) return;
+    this.fresh = [];
+    lab.act({ do: lab.ui.brush, reach: lab.ui.reach, path: fresh });
+  }
+
+  /** Arrows move the brush, Enter lowers and lifts it. */
+  key(event) {
+    const { ui } = this.lab, { engine } = this.side.run;
+    const heading = SIDEWAYS[event.key] ? SIDEWAYS[event.key][Number(this.even)] : KEYS[event.key];
+    if (heading === undefined && event.key !== "Enter") return;
+    event.preventDefault();
+    ui.focused = true;
+    ui.pointer ||= [engine.q(engine.queen), engine.r(engine.queen)];
+    if (heading !== undefined) {
+      if (SIDEWAYS[event.key]) this.even = !this.even;
+      const [q, r] = [ui.pointer[0] + STEPS[heading][0], ui.pointer[1] + STEPS[heading][1]];
+      if (engine.exists(q, r)) ui.pointer = [q, r];
+      if (ui.down) this.drawTo(ui.pointer);
+    } else if (ui.brush === "look") this.pick(centre(ui.pointer[0], ui.pointer[1]));
+    else if (ui.down) this.lift();
+    else this.lower();
+  }
+
+  /** Follow the ant nearest to a point, if one is near. */
+  pick([x, y]) {
+    const { engine } = this.side.run;
+    let best = -1, near = NEAR;
+    for (let i = 0; i < engine.ants; i++) {
+      const [a, b] = centre(engine.q(engine.cells[i]), engine.r(engine.cells[i])), far = Math.hypot(a - x, b - y);
+      if (far < near) [near, best] = [far, i];
+    }
+    this.lab.follow(best);
+  }
+}

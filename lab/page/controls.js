@@ -1,0 +1,167 @@
+/* controls.js: the settings, speeds and brushes beside the world. */
+
+import { LEARNERS, PARTS, RULES } from "./engine.js";
+import { many, seconds } from "./story.js";
+import { WORLDS } from "./worlds.js";
+
+/** @returns {any} an element, or null */
+export const byId = (id) => document.getElementById(id);
+
+const ICONS = {
+  play: '<path d="M5 3.2v11.6L15 9z"/>',
+  pause: '<path d="M4.5 3h3.2v12H4.5zM10.3 3h3.2v12h-3.2z"/>',
+  rock: '<path d="M3 13.5 4.6 7l4-3.6 4.6 2 2.3 5-1.6 3.1z"/>',
+  food: '<circle cx="6" cy="11.3" r="3.2"/><circle cx="12.3" cy="11.3" r="3.2"/><circle cx="9.1" cy="5.8" r="3.2"/>',
+  scent: '<path class="line" d="M2 12.5c2.2-3 4.4-3 6.6-.7s4.6 1.6 7.4-2.3M2 7.5c2.2-3 4.4-3 6.6-.7s4.6 1.6 7.4-2.3"/>',
+  erase: '<path class="line" d="M7.2 14.8 2.6 10.2a1.3 1.3 0 0 1 0-1.8l5.6-5.600a1.3 1.3 0 0 1 1.8 0l4.7 4.700a1.3 1.3 0 0 1 0 1.800l-5.5 5.500zm1.5 0h6.5"/>',
+  look: '<path class="line" d="M1.5 9S4.2 4 9 4s7.5 5 7.5 5-2.7 5-7.5 5S1.5 9 1.5 9z"/><circle cx="9" cy="9" r="2.4"/>',
+  undo: '<path class="line" d="M6.5 3.5 3 7l3.5 3.500M3.5 7h7a4 4 0 0 1 0 8H7"/>',
+};
+export const icon = (name) => `<svg viewBox="0 0 18 18" fill="currentColor" aria-hidden="true">${ICONS[name]}</svg>`;
+
+const SPEEDS = [0.5, 1, 4, 16];
+const BRUSHES = [["rock", "Rock", "Draw rock (R)"], ["food", "Food", "Draw food (F)"], ["scent", "Trail", "Draw a trail (T)"],
+                 ["erase", "Erase", "Erase rock, food and trails (E)"], ["look", "", "Look into an ant (L)"]];
+const COUNTS = [1, 2, 4, 8, 12, 16, 24, 32, 40, 48, 64, 80, 100, 128, 160, 200, 250, 300, 350, 400, 450, 500, 600, 700, 800, 1000,
+                1500, 2000, 3000, 5000, 10000];
+const percent = (v) => `${Math.round(v * 100)} %`;
+
+/** Sliders: the values of their steps, the words, and whether a change starts the run again. @type {any[]} */
+const SLIDERS = [
+  { name: "ants", label: "Ants", steps: COUNTS, words: many },
+  { name: "epsilon", label: "Exploration", steps: Array.from({ length: 51 }, (_, k) => k / 100), words: percent },
+  { name: "level", label: "Scent lasts", steps: Array.from({ length: 24 }, (_, k) => 50 * k + 50), words: seconds },
+  { name: "shaping", label: "Reward for walking a trail", steps: Array.from({ length: 11 }, (_, k) => k), words: (v) => `${v}` },
+  { name: "discount", label: "Discount", steps: Array.from({ length: 100 }, (_, k) => k / 100), words: (v) => v.toFixed(2) },
+  { name: "rate", label: "Learning rate", steps: Array.from({ length: 50 }, (_, k) => (k + 1) / 100), words: (v) => v.toFixed(2), more: true },
+  { name: "first", label: "First values", steps: Array.from({ length: 21 }, (_, k) => k), words: String, more: true, restarts: true },
+  { name: "regrowth", label: "Food grows back after", steps: [0, 20, 50, 100, 200, 500, 1000], words: (v) => (v ? seconds(v) : "at once"), more: true, restarts: true },
+];
+const RULE_NAMES = [["paper", "the paper’s"], ["foraging", "foraging"], ["queueing", "foraging and queues"]];
+const PART_NAMES = [["directed", "A: scent rises towards food"], ["rightOfWay", "B: ants with food have right of way"],
+                    ["seesAnts", "C: ants see each other"]];
+const PLACES = { meadow: "the meadow", plain: "the plain", steppe: "the steppe", bridge: "two bridges", paper: "the paper’s", daily: "today’s map" };
+const CROWDS = { plain: 1000, steppe: 10000, paper: 16 }; // ants to start with
+const LEARNER_NAMES = [["q_learning", "Q-learning"], ["sarsa", "SARSA"], ["frozen", "none: written by hand"]];
+const SIZES = ["small", "medium", "large", "huge"];
+
+/** The index of the step that is nearest to a value. */
+const stepOf = (steps, value) => steps.reduce((best, step, k) => (Math.abs(step - value) < Math.abs(steps[best] - value) ? k : best), 0);
+
+const switched = (id, label) => `<div class="control"><div class="name"><span id="l-${id}">${label}</span>`
+  + `<button class="switch" id="${id}" role="switch" aria-labelledby="l-${id}" aria-checked="false"></button></div></div>`;
+const selected = (id, label, options) => `<div class="control"><label><span>${label}</span><select id="${id}">`
+  + `${options.map(([value, words]) => `<option value="${value}">${words}</option>`).join("")}</select></label>`;
+const slider = ({ name, label, steps }) => `<div class="control"><label for="c-${name}"><span>${label}</span><output id="o-${name}"></output></label>`
+  + `<input type="range" id="c-${name}" min="0" max="${steps.length - 1}" step="1"></div>`;
+
+export class Controls {
+  constructor(lab) {
+    this.lab = lab;
+    this.build();
+    this.markSpeed = this.radios(byId("speeds"), SPEEDS.map((speed) => [speed, speed === 0.5 ? "½×" : `${speed}×`, `Speed ${speed}`]),
+                () => lab.ui.speed, (speed) => { lab.ui.speed = speed; });
+    this.radios(byId("brushes"), BRUSHES.map(([id, word, label]) => [id, `${icon(id)}${word && `<span class="name">${word}</span>`}`, label]),
+                () => lab.ui.brush, (brush) => lab.choose(brush));
+    byId("undo").innerHTML = icon("undo");
+    byId("undo").addEventListener("click", () => lab.undo());
+    byId("play").addEventListener("click", () => lab.play(!lab.ui.playing));
+    byId("restart").addEventListener("click", () => lab.restart());
+    addEventListener("keydown", (event) => this.key(event));
+  }
+
+  build() {
+    const rules = selected("rules", "Rules", RULE_NAMES) + '<div class="parts" id="parts" hidden>'
+      + `${PART_NAMES.map(([part, words]) => `<label><input type="checkbox" data-part="${part}">${words}</label>`).join("")}</div></div>`;
+    const [ants, exploration, ...others] = SLIDERS.filter(({ more }) => !more).map(slider);
+    byId("controls").innerHTML = ants + exploration + switched("learns", "Learning") + others.join("") + rules;
+    byId("more-controls").innerHTML = SLIDERS.filter(({ more }) => more).map(slider).join("")
+      + `${selected("learner", "Learner", LEARNER_NAMES.map(([learner, words]) => [LEARNERS[learner], words]))}</div>`
+      + `${selected("reach", "Brush size", SIZES.map((size, k) => [k, size]))}</div>`
+      + `${selected("place", "World", WORLDS.map(({ name }, k) => [k, PLACES[name]]))}</div>`
+      + '<div class="control"><label><span>Seed</span><input type="number" id="seed" min="0" max="4294967295" step="1"></label></div>'
+      + `${selected("theme", "Colours", [["dark", "dark"], ["light", "light"]])}</div>`;
+    for (const each of SLIDERS) this.listen(each);
+    const on = (id, act) => byId(id).addEventListener("change", ({ target }) => act(target));
+    byId("learns").addEventListener("click", () => this.lab.set("learns", this.scene.learns ? 0 : 1));
+    on("rules", ({ value }) => this.lab.restart({ rules: RULES[value] }));
+    on("parts", ({ dataset }) => this.lab.restart({ rules: this.scene.rules ^ PARTS[dataset.part] }));
+    on("learner", ({ value }) => this.lab.restart({ learner: Number(value) }));
+    on("reach", ({ value }) => { this.lab.ui.reach = Number(value); });
+    on("place", ({ value }) => this.lab.restart({ world: Number(value), ants: CROWDS[WORLDS[value].name] || 64 }));
+    on("seed", ({ value }) => this.lab.restart({ seed: Math.max(0, Math.min(2 ** 32 - 1, Math.floor(value))) }));
+    on("theme", ({ value }) => this.lab.setTheme(value));
+  }
+
+  /** The scene whose settings the controls change: the right one of two. */
+  get scene() { return this.lab.runs[this.lab.runs.length - 1].engine.scene; }
+
+  listen({ name, steps, words, restarts }) {
+    const input = byId(`c-${name}`);
+    const say = () => this.say(name, words(steps[Number(input.value)]));
+    input.addEventListener("input", say);
+    input.addEventListener("change", () => {
+      const value = steps[Number(input.value)];
+      if (restarts) this.lab.restart({ [name]: value });
+      else this.lab.set(name, value);
+    });
+  }
+
+  say(name, words) {
+    const input = byId(`c-${name}`);
+    byId(`o-${name}`).textContent = words;
+    input.setAttribute("aria-valuetext", words);
+    input.style.setProperty("--at", `${100 * Number(input.value) / Number(input.max)}%`);
+  }
+
+  /** Show the present settings. */
+  show() {
+    const { scene } = this, ui = this.lab.ui;
+    for (const { name, steps, words } of SLIDERS) {
+      byId(`c-${name}`).value = String(stepOf(steps, scene[name]));
+      this.say(name, words(scene[name]));
+    }
+    byId("learns").setAttribute("aria-checked", String(Boolean(scene.learns)));
+    const fill = (id, value) => { byId(id).value = String(value); };
+    const foraging = scene.rules && !(scene.rules & PARTS.queues);
+    fill("rules", scene.rules & PARTS.queues ? "queueing" : foraging ? "foraging" : "paper");
+    byId("parts").hidden = !foraging;
+    for (const box of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("[data-part]"))) {
+      box.checked = Boolean(scene.rules & PARTS[box.dataset.part]);
+    }
+    for (const [id, value] of [["reach", ui.reach], ["place", scene.world], ["learner", scene.learner], ["seed", scene.seed], ["theme", ui.theme]]) fill(id, value);
+  }
+
+  /** Buttons of which one is chosen; arrow keys choose the next one. */
+  radios(box, items, now, choose) {
+    box.innerHTML = items.map(([id, html, label]) => `<button role="radio" data-value="${id}" aria-label="${label}" title="${label}">${html}</button>`).join("");
+    const buttons = [...box.children];
+    const mark = () => buttons.forEach((button, k) => {
+      const chosen = items[k][0] === now();
+      button.setAttribute("aria-checked", String(chosen));
+      button.tabIndex = chosen ? 0 : -1;
+    });
+    buttons.forEach((button, k) => button.addEventListener("click", () => { choose(items[k][0]); mark(); }));
+    box.addEventListener("keydown", (event) => {
+      const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      const next = buttons[(buttons.indexOf(event.target) + step + buttons.length) % buttons.length];
+      next.click();
+      next.focus();
+    });
+    mark();
+    return mark;
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || /INPUT|SELECT|TEXTAREA/.test(event.target.tagName)) return;
+    const brush = { r: "rock", f: "food", t: "scent", e: "erase", l: "look" }[event.key.toLowerCase()];
+    if (brush) /** @type {HTMLElement} */ (document.querySelector(`#brushes [data-value="${brush}"]`)).click();
+    if (event.key.toLowerCase() === "z") this.lab.undo();
+    if (event.key === " " && event.target.tagName !== "BUTTON" && event.target.tagName !== "SUMMARY") {
+      event.preventDefault();
+      byId("play").click();
+    }
+  }
+}

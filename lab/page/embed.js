@@ -1,0 +1,86 @@
+/* embed.js: the lab in a frame of another page, which can steer it by messages.
+ *
+ *   frame.contentWindow.postMessage({ lab: "start", scene: "copies" }, "*")    a question by its name, or a link's code
+ *   { lab: "play" }, { lab: "pause" }, { lab: "speed", value: 4 }, { lab: "undo" }
+ *   { lab: "set", name: "epsilon", value: 0.1 }     a setting, as in engine.js
+ *   { lab: "strokes", strokes: [{ do: "rock", reach: 1, path: [[q, r], ...] }] }
+ *   { lab: "skip", ticks: 500 }                     pass ticks at once
+ *   { lab: "facts", every: 0 }                      answer once, or every so many ms
+ *
+ * Each message is answered by { lab: "facts", ... } or { lab: "error", message }; `id` is returned if it was given.
+ * `?bare` in the address hides all but the world, the play button and the brushes.
+ */
+
+import { visitOf } from "./address.js";
+
+const SETTINGS = ["ants", "epsilon", "rate", "discount", "level", "shaping", "learns"];
+const STROKES = ["rock", "food", "scent", "erase"];
+const MOST_TICKS = 100_000, FASTEST_MS = 50;
+
+export class Embed {
+  constructor(lab) {
+    this.lab = lab;
+    document.documentElement.classList.toggle("bare", /[?&]bare\b/.test(location.search));
+    addEventListener("message", (event) => this.receive(event));
+    if (parent !== window) parent.postMessage({ lab: "ready" }, "*");
+  }
+
+  receive({ data, source }) {
+    if (!data || typeof data !== "object" || typeof data.lab !== "string" || !source) return;
+    const answer = (message) => source.postMessage({ ...message, ...(data.id === undefined ? {} : { id: data.id }) }, "*");
+    try {
+      this.act(data, answer);
+      answer(this.facts());
+    } catch (error) {
+      answer({ lab: "error", message: error.message });
+    }
+  }
+
+  act(data, answer) {
+    const { lab } = this, number = (value, least, most) => {
+      if (!Number.isFinite(value) || value < least || value > most) throw new Error(`${data.lab}: ${value} is not between ${least} and ${most}.`);
+      return value;
+    };
+    const acts = {
+      start: () => (data.scene ? lab.address.open(String(data.scene)) : lab.begin()),
+      play: () => lab.play(true),
+      pause: () => lab.play(false),
+      speed: () => { lab.ui.speed = number(data.value, 0.1, 64); },
+      undo: () => lab.undo(),
+      set: () => {
+        if (!SETTINGS.includes(data.name)) throw new Error(`set: ${data.name} is not one of ${SETTINGS.join(", ")}.`);
+        lab.set(data.name, number(data.value, 0, 10_000));
+      },
+      strokes: () => data.strokes.forEach((stroke) => this.draw(stroke)),
+      skip: () => { for (let k = number(data.ticks, 0, MOST_TICKS); k >= 1; k--) lab.advance(); },
+      facts: () => {
+        clearInterval(this.telling);
+        if (data.every) this.telling = setInterval(() => answer(this.facts()), number(data.every, FASTEST_MS, 1e6));
+      },
+    };
+    if (!Object.hasOwn(acts, data.lab)) throw new Error(`${data.lab} is not one of ${Object.keys(acts).join(", ")}.`);
+    acts[data.lab]();
+  }
+
+  draw({ do: brush, reach, path }) {
+    const { engine } = this.lab.runs[0];
+    if (!STROKES.includes(brush) || !(reach >= 0 && reach <= 7)) throw new Error(`strokes: \`do\` is one of ${STROKES.join(", ")}, \`reach\` 0 to 7.`);
+    const cells = path.map(([q, r]) => engine.at(q, r));
+    if (!cells.length || !path.every(([q, r]) => engine.exists(q, r))) throw new Error("strokes: a path has cells [q, r] of the world.");
+    const whole = cells.slice(1).reduce((all, cell) => all.concat(engine.line(all[all.length - 1], cell).slice(1)), [cells[0]]);
+    this.lab.act({ do: brush, reach, path: whole });
+  }
+
+  facts() {
+    this.lab.words(); // the story of now
+    const { runs, ui, told } = this.lab;
+    return {
+      lab: "facts", playing: ui.playing, story: told, link: visitOf(runs),
+      sides: runs.map((run) => ({
+        tick: run.tick, ants: run.engine.ants, deliveries: run.engine.deliveries, perMinute: run.perMinute, returns: run.engine.returns,
+        hash: run.engine.hash(), facts: { ...run.facts },
+        wall: run.wall && { tick: run.wall.tick, crossed: run.wall.crossed, came: run.wall.came, detour: run.wall.detour, stopped: run.wall.stopped },
+      })),
+    };
+  }
+}

@@ -1,0 +1,27 @@
+/* geometry.js: where cells lie. The unit of length is the distance from the centre of a cell to its corners. */
+
+export const ROOT3 = Math.sqrt(3);
+
+/** The centre of a cell; y points down, heading 0 up. @returns {[number, number]} */
+export const centre = (q, r) => [1.5 * r, ROOT3 * (r / 2 - q)];
+
+/** The direction of a heading as an angle of the canvas. */
+export const angleOf = (heading) => (heading - 1.5) * Math.PI / 3;
+
+/** The coordinates of the cell at a point. @returns {[number, number]} */
+export function cellAt(x, y) {
+  const r = x / 1.5, q = r / 2 - y / ROOT3, p = r - q; // p + q - r = 0
+  let Q = Math.round(q), R = Math.round(r);
+  const P = Math.round(p), dq = Math.abs(Q - q), dr = Math.abs(R - r), dp = Math.abs(P - p);
+  if (dq > dr && dq > dp) Q = R - P;
+  else if (dr > dp) R = P + Q;
+  return [Q, R];
+}
+
+/** A whole number below n that looks random but depends only on a and b (a hash of 32 bits). */
+export function scatter(a, b, n) {
+  let h = Math.imul(a ^ 0x9e3779b9, 0x85ebca6b) ^ Math.imul(b + 0x7f4a7c15, 0xc2b2ae35);
+  h = Math.imul(h ^ h >>> 15, 0x2c1b3c6d);
+  h = Math.imul(h ^ h >>> 12, 0x297a2d39);
+  return ((h ^ h >>> 15) >>> 0) % n;
+}

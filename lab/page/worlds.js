@@ -1,0 +1,113 @@
+// The scene of a visit, and its world. Worlds are painted in whole numbers, as in taichi_ants/worlds/lab.py.
+
+/**
+ * @typedef {object} Scene
+ * @property {number} world number in WORLDS
+ * @property {number} rules see RULES and PARTS in engine.js
+ * @property {number} learner see LEARNERS in engine.js
+ * @property {number} seed of the ants, and of the daily world; at most 2 ** 53 - 1
+ * @property {number} ants
+ * @property {number} epsilon exploration, in thousandths like the next two
+ * @property {number} rate
+ * @property {number} discount
+ * @property {number} learns 0 or 1
+ * @property {number} first value of all actions at the start; high values make ants try everything
+ * @property {number} level how many ticks new scent lasts; it fades with a slope of level / 50
+ * @property {number} regrowth ticks until food grows back; -1 for never
+ * @property {number} shaping reward for walking onto a trail, or nearer to the nest
+ */
+
+/** The first screen. @type {Scene} */
+export const SCENE = {
+  world: 0, rules: 15, learner: 0, seed: 85, ants: 64, epsilon: 0.03, rate: 0.1, discount: 0.9,
+  learns: 1, first: 5, level: 600, regrowth: 0, shaping: 1,
+};
+
+// The next lines are written by `python lab/engine/build.py`, from taichi_ants.
+/* GENERATED */
+const LAB = {
+  "home": 14, "trail": 25, "pile": 12, "fromHome": 8, "fromEdge": 4,
+  "worlds": [
+    {"name": "meadow", "radius": 32, "queen": [-15, -18], "shapes": [
+      [5, 6, -12, 9], [5, 9, -9, 13], [5, 11, -5, 6], [5, 23, 4, 9], [5, 23, 7, 6], [5, 12, -1, 5],
+      [5, -9, 3, 13], [5, -10, 6, 9], [5, -14, -1, 6], [5, 2, 19, 12], [5, 1, 21, 8],
+      [5, -28, -16, 9], [5, -28, -13, 5], [5, -20, 8, 9], [5, -17, 11, 4], [5, -4, -25, 7],
+      [5, -7, -25, 3], [5, 27, 15, 6], [5, 26, 17, 3], [5, 16, 28, 4], [7, 17, 19, 13]
+    ]},
+    {"name": "plain", "radius": 64, "queen": [0, 0], "rocks": 90, "largest": 24, "piles": 9, "nearest": 14, "shapes": []},
+    {"name": "steppe", "radius": 130, "queen": [0, 0], "rocks": 260, "largest": 40, "piles": 24, "nearest": 14, "shapes": []},
+    {"name": "bridge", "radius": 24, "queen": [-17, 0], "walled": true, "shapes": [
+      [0, -17, 0, 27], [0, -12, 0, 1, 0, 2], [0, 10, 0, 1, 0, 2], [0, 17, 0, 27],
+      [0, -10, 0, 1, 1, 3], [0, -7, 3, 1, 0, 17], [0, 10, 3, 1, 5, 3], [0, -10, 0, 1, 5, 9],
+      [0, -10, -9, 1, 0, 11], [0, 1, -9, 1, 1, 9], [7, 17, 0, 9]
+    ]},
+    {"name": "paper", "radius": 10, "queen": [-9, 0], "shapes": [
+      [2, -8, 0, 0, 0, 16], [7, 9, 0, 0]
+    ]},
+    {"name": "daily", "radius": 30, "queen": [-13, -15], "rocks": 36, "largest": 13, "piles": 2, "nearest": 28, "daily": true, "shapes": []}
+  ]
+};
+export const FOLLOWERS = {
+  128: "BCDHEADHBBBHHHHHFBDHDADHBBBHHHHHAAEHAAEHBBBHHHHHHHHHHHHHHHHHHHHHGCDPEADPBBFPPPPPFBDPDADPBBFPPPPPAAEPAAEPCCGPPPPPPPPPPPPPPPPPPPPP",
+  432: "BCDHPCEADHPABBBHPBHHHHHHPPPHPPEADHPAFBDHPBDADHPABBBHPBHHHHHHPPPHPPDADHPAAAEHPAAAEHPABBBHPBHHHHHHPPPHPPAAEHPAHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHPPPHPPPPPHPPPPPHPPHHHHHHPPPHPPPPPHPPFBDHPBDADHPABBBHPBHHHHHHPPPHPPDADHPAGCDPDGEADPDEBBBPBBPPPPPPBBBPBBGCDPDGFBDPDFDADPDDBBBPBBPPPPPPBBBPBBFBDPDFAAEPEAAAEPEABBBPBBPPPPPPBBBPBBAAEPEAPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPAAEPEAAAEPEABBBPBBPPPPPPBBBPBBAAEPEAGCDPDGEADPDEBBBPBBPPPPPPBBBPBBGCDPDG",
+  686: "BCDHDCPEADHDAPBBBHBBBHHHHHHHBBBHBBBEADHDAPPPDHPPPFBDHDBPDADHDAPBBBHBBBHHHHHHHBBBHBBBDADHDAPPPDHPPPAAEHAAAAAEHAAABBBHBBBHHHHHHHBBBHBBBAAEHAAAAAEHAAAHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHAADHEAPAADHEAPBBBHBBBHHHHHHHBBBHBBBAADHEAPPPDHPPPFBDHDBPDADHDAPBBBHBBBHHHHHHHBBBHBBBDADHDAPPPDHPPPPPDHPPPPPDHPPPBBBHBBBHHHHHHHBBBHBBBPPDHPPPPPDHPPPGCDPDGHEADPDEHBBBPBBBPPPPPPPBBBPBBBGCDPDGHHHDPDHHFBDPDFHDADPDDHBBBPBBBPPPPPPPBBBPBBBFBDPDFHHHDPDHHAAEPEAAAAEPEAABBBPBBBPPPPPPPBBBPBBBAAEPEAAAAEPEAAPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPAAEPEAAAAEPEAABBBPBBBPPPPPPPBBBPBBBAAEPEAAAAEPEAAGCDPDGHEADPDEHBBBPBBBPPPPPPPBBBPBBBGCDPDGHHHDPDHHHHDPDHHHHDPDHHBBBPBBBPPPPPPPBBBPBBBHHDPDHHHHDPDHH",
+};
+/* END */
+
+export const WORLDS = /** @type {any[]} */ (LAB.worlds);
+const PAINTS_EMPTY = 0, PAINTS_SCENT = 2, PAINTS_ROCK = 5, PAINTS_FOOD = 7;
+const STEP_Q = [1, 1, 0, -1, -1, 0], STEP_R = [0, 1, 1, 0, -1, -1];
+const lengthOf = (q, r) => Math.max(q, r, 0) - Math.min(q, r, 0);
+
+/** A random word of 32 bits. */
+function wordOf(seed, number) {
+  let word = Math.imul(seed ^ 0x9E3779B9, 0x85EBCA6B) ^ Math.imul(number + 0x7F4A7C15, 0xC2B2AE35);
+  word = Math.imul(word ^ word >>> 15, 0x2C1B3C6D);
+  word = Math.imul(word ^ word >>> 12, 0x297A2D39);
+  return (word ^ word >>> 15) >>> 0;
+}
+
+function drawnShapes({ radius, queen, rocks, largest, piles, nearest, daily }, seed) {
+  let number = 0;
+  const draw = (n) => wordOf(daily ? seed : 0, number++) % n;
+  const place = (least) => {
+    for (;;) {
+      const q = draw(2 * radius) - radius, r = draw(2 * radius) - radius;
+      if (lengthOf(q, r) < radius - LAB.fromEdge && lengthOf(q - queen[0], r - queen[1]) >= least) return [q, r];
+    }
+  };
+  const shapes = [];
+  for (let k = 0; k < rocks; k++) shapes.push([PAINTS_ROCK, ...place(LAB.fromHome), draw(largest)]);
+  for (let k = 0; k < piles; k++) shapes.push([PAINTS_FOOD, ...place(nearest), LAB.pile]);
+  return shapes;
+}
+
+/**
+ * The world of a scene: its radius, and lists of cells (see engine.js).
+ * @param {{ world: number, seed: number }} scene
+ */
+export function makeWorld({ world, seed }) {
+  const lab = WORLDS[world], R = lab.radius, width = 2 * R + 1;
+  const ground = new Uint8Array(width * width), scent = new Uint8Array(width * width);
+  if (lab.walled) ground.fill(PAINTS_ROCK);
+  const shapes = lab.shapes.length ? lab.shapes : drawnShapes(lab, seed);
+  for (const [paints, q0, r0, square, heading = 0, n = 0] of [...shapes, [PAINTS_EMPTY, ...lab.queen, LAB.home]]) {
+    const reach = Math.ceil(Math.sqrt(square * 4 / 3)) + 1;
+    for (let k = 0; k <= n; k++) {
+      const q = q0 + k * STEP_Q[heading], r = r0 + k * STEP_R[heading];
+      for (let b = -reach; b <= reach; b++)
+        for (let a = -reach; a <= reach; a++)
+          if (a * a - a * b + b * b <= square && lengthOf(q + a, r + b) < R)
+            (paints === PAINTS_SCENT ? scent : ground)[(r + b + R) * width + q + a + R] = paints;
+    }
+  }
+  /** @type {{ rocks: number[], foods: number[], scent: number[] }} */
+  const cells = { rocks: [], foods: [], scent: [] };
+  for (let cell = 0; cell < ground.length; cell++) {
+    if (lengthOf(cell % width - R, Math.floor(cell / width) - R) >= R) continue;
+    if (ground[cell] === PAINTS_ROCK) cells.rocks.push(cell);
+    if (ground[cell] === PAINTS_FOOD) cells.foods.push(cell);
+    if (scent[cell]) cells.scent.push(cell);
+  }
+  return { name: lab.name, radius: R, queen: (lab.queen[1] + R) * width + lab.queen[0] + R, ...cells };
+}

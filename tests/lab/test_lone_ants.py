@@ -1,0 +1,66 @@
+"""Lone ants of the page train as `train` does; a compiler builds the same programs again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import runpy
+import shutil
+
+import numpy as np
+import pytest
+from lab_engines import ENGINE, Node
+
+from taichi_ants import TrainingConfig, train, worlds
+from taichi_ants.task import Task
+
+SEEDS = [1, 7, 2**40 + 3]
+
+
+def check(ask, setting, **more):
+    """Assert that a run of the page has the returns, steps and deliveries of `train`."""
+    found = ask("train", **setting, **more, seeds=SEEDS)
+    names = ("learner", "rate", "discount", "epsilon", "decay")
+    more_steps = {"planning_steps": setting["planningSteps"]} if setting["planningSteps"] else {}
+    config = TrainingConfig(*(setting[name] for name in names), **more_steps)
+    task = Task(delivery="truncates" if setting["truncates"] else "terminates")
+    lengths = {"episodes": more["episodes"], "max_steps": more["maxSteps"]} if more else {}
+    wanted = train(worlds.paper(), config, SEEDS, task=task, **lengths)
+    for name in ("returns", "steps", "deliveries"):
+        assert found[name] == np.ravel(getattr(wanted, name)).tolist()
+    return sum(found["deliveries"])
+
+
+def test_runs_are_those_of_train(ask):
+    grid = ask("grid")
+    assert len(grid) == 128
+    delivered = [check(ask, setting, episodes=60, maxSteps=200) for setting in grid[5::32]]
+    assert all(delivered)
+
+
+@pytest.mark.slow
+def test_runs_of_the_whole_grid_are_those_of_train(ask):
+    assert sum(check(ask, setting) for setting in ask("grid")) > 1000
+
+
+def test_the_committed_programs_are_those_of_the_record():
+    built = json.loads((ENGINE / "built.json").read_text("utf-8"))
+    for name in ("colony.wasm", "ant.wasm"):
+        assert hashlib.sha256((ENGINE / name).read_bytes()).hexdigest() == built[name]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("wasm-ld") is None, reason="there is no clang with lld")
+def test_a_new_build_has_the_same_results(ask, tmp_path):
+    runpy.run_path(str(ENGINE / "build.py"))["build"](tmp_path)
+    again = Node(tmp_path)
+    try:
+        for rules in (0, 5, 7, 15):
+            stroke = {"tick": 50, "do": "rock", "reach": 2, "path": [2112]}
+            visit = {"scene": {"rules": rules, "learner": 1}, "changes": [stroke], "ticks": 300}
+            assert again("visit", visit) == ask("visit", visit)
+        for setting in ask("grid")[::40]:
+            one = {**setting, "seeds": SEEDS, "episodes": 50}
+            assert again("train", one) == ask("train", one)
+    finally:
+        again.close()
