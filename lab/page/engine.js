@@ -42,7 +42,7 @@
  *   lone.train({ learner, rate, discount, epsilon, decay, planningSteps, truncates, seeds, episodes,
  *                maxSteps }) -> { returns, steps, deliveries }, each Int32Array (seeds * episodes);
  *   lone.values   the tables of the last call, Float32Array (seeds * 640)
- *   GRID is the paper's grid, 128 settings for `train`; 100 seeds of one take about 0.15 s
+ *   GRID is the paper's grid, 128 settings for `train`; 100 seeds of one take about 0.2 s
  */
 
 import { FOLLOWERS, makeWorld } from "./worlds.js";
