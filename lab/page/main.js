@@ -100,7 +100,8 @@ class Lab {
     });
     byId("views").classList.toggle("two", starts.length > 1);
     byId("other").hidden = starts.length < 2;
-    byId("unit").innerHTML = starts.length < 2 ? "food per <br>minute" : "right, per <br>minute";
+    byId("figures").classList.toggle("two", starts.length > 1);
+    byId("unit").innerHTML = starts.length < 2 ? "food per <br>minute" : "right, per minute";
     Object.assign(this.ui, { followed: -1, hero: -1, ghost: null });
     this.plot.reset();
     [this.told, this.owed, this.fits] = ["", 0, false];
