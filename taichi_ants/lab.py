@@ -247,11 +247,11 @@ def state_hash(colony: Colony) -> str:
     """
     slots = np.flatnonzero(colony.living[0])
     slots = slots[np.argsort(colony.numbers[0, slots])]
-    cells, headings, loads, streams = (
+    cells, headings, carry, streams = (
         column[0, slots].astype(np.uint64).tolist()
         for column in (colony.cells, colony.headings, colony.carrying, colony.streams)
     )
-    ants = zip(cells, headings, loads, streams, strict=True)
+    ants = zip(cells, headings, carry, streams, strict=True)
     words = [word for cell, h, load, s in ants for word in (cell << 8 | h << 1 | load, s)]
     stored, clock = colony.stored_pheromone(0, 0)
     levels = np.maximum(stored.astype(np.int64) - clock, 0)

@@ -80,7 +80,7 @@ class Interventions:
                 names = list(self.colony.task.foods)
                 kind = names.index(change.kind) if change.kind else 0
                 what = OBSTACLE if change.what == "rock" else FOOD
-                self._put(cells, what, kind, world.full(kind))
+                self._put(cells, what, kind)
             case language.Clear():
                 self._put(cells, EMPTY)
             case language.Move():
@@ -108,7 +108,7 @@ class Interventions:
             return change.number
         return int(change.share * len(self._ants(change.nest)) + 0.5)
 
-    def _put(self, cells: Sequence[Cell], what: int, kind: int = 0, loads: int = 1) -> None:
+    def _put(self, cells: Sequence[Cell], what: int, kind: int = 0) -> None:
         """Make cells EMPTY, OBSTACLE or FOOD, except those of ants and queens."""
         world = self.colony.world
         self._move_aside(cells if what != EMPTY else ())
@@ -117,7 +117,7 @@ class Interventions:
                 continue
             world.ground[cell] = what
             if what == FOOD:
-                world.put_food(cell, kind, loads)
+                self.colony.fill(cell, kind)
                 self.colony.food_sources.put(cell, kind)
             else:
                 self.colony.food_sources.end(cell)
@@ -146,7 +146,9 @@ class Interventions:
             self._move_queen(to, world.queens.index(cell))
         elif to not in world.ants:
             self._put([cell], EMPTY)
-            self._put([to], what, world.kinds.get(cell, 0), world.loads.get(cell, 1))
+            food = world.of_cells[cell]
+            self._put([to], what, food.get("kind_of", 0))
+            world.of_cells[to] = food
 
     def _move_queen(self, cell: Cell, nest: int) -> None:
         """Move a queen to an empty cell; an ant there moves aside."""

@@ -283,7 +283,7 @@ class ColonyPoint:
     @property
     def seconds(self) -> float:
         """The approximate time of a seed on one processor."""
-        fields = [one for one in (self.task.pheromone, *self.task.fields.values()) if one.dense]
+        fields = [one for one in self.task.pheromones.values() if one.dense]
         work = sum(_WORK_OF_DIFFUSION if one.diffusion else _WORK_OF_A_CELL for one in fields)
         ants = self.ants + work * self.first_world.grid.size
         return ants * self.ticks * (self.episodes + self.rollouts) / _TICKS_OF_A_SECOND
@@ -307,7 +307,7 @@ class ColonyPoint:
             least = 0.0 if self.policy else self.training.least_epsilon
             epsilon = least if self.evaluation_epsilon is None else self.evaluation_epsilon
             training = TrainingConfig.frozen(epsilon)
-        if not self.task.choice.needs_table:
+        if not self.task.needs_table:
             training = None
         options |= {"ants": self.ants, "capacity": self.capacity, "start": self.start}
         options |= {"sharing": self.sharing if learns else "frozen", "q_values": q_values}

@@ -144,7 +144,7 @@ class Base(NamedTuple):
             if key not in built:
                 built[key] = FixedPolicy.named(tree["policy"], task)
             tree["policy"] = built[key]
-        if "policy" in tree or (self.kind == "colony" and not task.choice.needs_table):
+        if "policy" in tree or (self.kind == "colony" and not task.needs_table):
             training = TrainingConfig.frozen().as_dict()  # `check_training` refuses others
         key = repr(sorted(world.items()))
         if key not in built:
@@ -213,7 +213,7 @@ def check_training(names: Iterable[str], points: Sequence[Point]) -> None:
     name = next((name for name in names if name.split(".")[0] == "training"), None)
     if name is None or any(point.episodes for point in points):
         return
-    explores = isinstance(points[0], ColonyPoint) and points[0].task.choice.needs_table
+    explores = isinstance(points[0], ColonyPoint) and points[0].task.needs_table
     more = ", or set evaluation_epsilon to let them explore" if explores else ""
     raise AntsError(
         f"{name} has no effect, because ants do not learn if episodes is 0; leave it out{more}."

@@ -112,7 +112,7 @@ def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[ProtocolEvent]
     if castes[1]:  # your rules can read thresholds; `drawn_castes` draws others
         changes = {"labour": "thresholds", "castes": {"one": {"threshold": 1.0}}, **changes}
     drawn = replace(drawn, task=drawn.task.replace(**changes))
-    if not drawn.task.choice.needs_table:
+    if not drawn.task.needs_table:
         drawn = replace(drawn, training=None, q_values=None)
     made = drawn_castes(drawn, seed, *castes)
     if made is None or made.world.n_nests != nests:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from random_castes import drawn_castes
 from random_choices import NO_NOISE, NOISE
-from random_colonies import random_colony, with_nests
+from random_colonies import mortal, random_colony, with_nests
 from random_protocols import random_protocol
 from same_colonies import assert_equal
 
@@ -68,7 +68,7 @@ def drawn_cases(kernel, seed, n_worlds):
         **dict(zip(("fields", "cues"), more, strict=False)),
     )
     if len(more) > 2:
-        drawn = with_nests(drawn, seed, *more[2])
+        drawn = with_nests(mortal(drawn), seed, *more[2])
     if kernel is WITH_CASTES:
         cues = [("trail", "a"), ("a", "compass")]
         drawn = (
