@@ -351,6 +351,9 @@ def test_a_course_page_steers_the_lab_in_a_frame(browser, tmp_path):
     assert send(lab="speed", value=100)["message"] == "speed: 100 is not between 0.1 and 64."
     assert send(lab="fly")["message"].startswith("fly is not one of")
     assert send(lab="start", scene="copies")["story"] == "ask-copies"
+    assert send(lab="say", option=9)["message"] == "say: 9 is not between 0 and 2."
+    assert send(lab="say", option=2)["story"] == "run-copies"
+    assert send(lab="say", option=2)["lab"] == "error"
 
 
 @pytest.mark.browser
