@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from plain_measures import MEASURES, measured
 from random_colonies import mortal, random_colony
 
 from taichi_ants import Colony, TrainingConfig, measures, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.measures import MEASURES, measured
 from taichi_ants.task import foraging
 
 EVERY, EPISODES, TICKS = 3, 2, 20

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plain_interventions import Protocol
 from random_castes import drawn_castes
 from random_choices import NO_NOISE, NOISE
 from random_colonies import mortal, random_colony, with_nests
@@ -21,7 +22,6 @@ from taichi_ants.interventions import Place, RemoveAnts, from_dict
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.protocol import At, Every, When
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.interventions import Protocol
 from taichi_ants.task import foraging
 from taichi_ants.task.constants import BEST_AT, EMPTY, FOOD, OBSTACLE, ROW
 
