@@ -257,7 +257,7 @@ class Lab {
     byId("call").hidden = !told.call;
     if (byId("call").textContent !== (told.call || "")) byId("call").textContent = told.call || "";
     ui.hero = told.id === "food" ? run.facts.firstAnt : -1; // who found food first is marked until it is home
-    if (told.ghost && !ui.down) ui.ghost ||= run.suggestion();
+    if (told.ghost && !ui.down && !this.film.copy) ui.ghost ||= run.suggestion();
     else ui.ghost = null;
     byId("rate").textContent = many(run.perMinute);
     if (runs.length > 1) byId("rate-left").textContent = many(runs[0].perMinute);
