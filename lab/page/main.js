@@ -224,7 +224,7 @@ class Lab {
 
   frame(now) {
     requestAnimationFrame((next) => this.frame(next));
-    const { ui } = this, passed = Math.min(0.1, (now - this.last) / 1000 || 0);
+    const { ui } = this, passed = Math.min(0.3, (now - this.last) / 1000 || 0);
     [this.last, ui.now] = [now, now];
     if (!this.fits) this.fit();
     for (const brush of this.brushes) brush.flush();
