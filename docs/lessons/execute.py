@@ -1,7 +1,7 @@
-"""Run the lessons and save their results, or write an edition for a class.
+"""Run the lessons and save their results, or write editions for students and teachers.
 
     python docs/lessons/execute.py [NOTEBOOK ...]
-    python docs/lessons/execute.py --class-edition FOLDER [NOTEBOOK ...]
+    python docs/lessons/execute.py --editions FOLDER [NOTEBOOK ...]
 
 Needs nbclient and ipykernel, which the extras `lessons` and `test` install. Text is saved in the
 notebooks. Pictures become files in `images/`, to which the notebooks refer, so that changes of a
@@ -9,7 +9,8 @@ notebook can be reviewed; if you run a cell, you see your own picture instead. A
 a description of its picture in its metadata, as `alt`. Pages that play are not saved: they are
 large, and web hosts do not show them.
 
-An edition for a class has neither results nor solutions.
+The edition for students has no results, and its answers are folded. The edition for teachers has
+all results, and its answers are open.
 """
 
 from __future__ import annotations
@@ -17,11 +18,14 @@ from __future__ import annotations
 import argparse
 import base64
 import io
+import shutil
 from pathlib import Path
 from typing import Any
 
 FOLDER = Path(__file__).parent
 IMAGES = "images"
+SOLUTIONS = "## Solutions"
+YOURS = "# your turn"
 INSTEAD = "(When you run this cell, a page that plays appears here.)"
 _SECONDS = 300  # a cell may take
 
@@ -73,27 +77,78 @@ def packed(picture: bytes) -> bytes:
     return file.getvalue()
 
 
-def without_solutions(path: Path) -> Any:
-    """Return the notebook of a file without results, and without its section of solutions.
+def for_students(path: Path) -> Any:
+    """Return the notebook of a file without results, with folded solutions and parts to write.
+
+    In a cell with the tag `yours`, students write what follows `# your turn`; the saved lines are
+    a folded answer below it. The code of solutions is folded too.
 
     Raises:
-        ValueError: The notebook has no section "## Solutions".
+        ValueError: The notebook has no section "## Solutions", or a cell no line `# your turn`.
     """
     import nbformat
 
     notebook = nbformat.read(path, as_version=4)
-    first = [cell.source.strip() for cell in notebook.cells].index("## Solutions")
-    notebook.cells = notebook.cells[:first]
-    for cell in notebook.cells:
+    first = [cell.source.strip() for cell in notebook.cells].index(SOLUTIONS)
+    cells = []
+    for cell in notebook.cells[:first]:
         if cell.cell_type == "code":
             cell.outputs, cell.execution_count = [], None
+        cells.append(cell)
+        if "yours" in cell.metadata.get("tags", ()):
+            answer = folded("Answer", [cell])
+            start = cell.source.index(YOURS) + len(YOURS)
+            indent = cell.source[:start].rpartition("\n")[2].removesuffix(YOURS)
+            cell.source = f"{cell.source[:start]}\n{indent}raise NotImplementedError"
+            cells.append(nbformat.v4.new_markdown_cell(answer, id=f"{cell.id}-answer"))
+    cells.append(notebook.cells[first])
+    solutions: list[list[Any]] = []
+    for cell in notebook.cells[first + 1 :]:
+        if cell.cell_type == "markdown":
+            solutions.append([])
+        solutions[-1].append(cell)
+    for number, parts in enumerate(solutions, start=1):
+        answer = folded(f"Solution {number}", parts)
+        cells.append(nbformat.v4.new_markdown_cell(answer, id=parts[0].id))
+    notebook.cells = cells
     return notebook
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Run some notebooks, or all of them, and save their results; or write them for a class."""
+def folded(title: str, cells: list[Any]) -> str:
+    """Markdown that shows cells when a reader asks for them."""
+    texts = [
+        cell.source if cell.cell_type == "markdown" else f"```python\n{cell.source}\n```"
+        for cell in cells
+    ]
+    return "\n\n".join([f"<details>\n<summary><b>{title}</b></summary>", *texts, "</details>"])
+
+
+def for_teachers(path: Path) -> Any:
+    """Return the notebook of a file with its results, and with all answers open."""
     import nbformat
 
+    notebook = nbformat.read(path, as_version=4)
+    for cell in notebook.cells:
+        cell.source = cell.source.replace("<details>", "<details open>")
+        cell.metadata.pop("jp-MarkdownHeadingCollapsed", None)
+    return notebook
+
+
+def write_editions(path: Path, folder: Path) -> None:
+    """Write both editions of a lesson, and the pictures to which that for teachers refers."""
+    import nbformat
+
+    for edition, notebook in (("students", for_students(path)), ("teachers", for_teachers(path))):
+        (folder / edition).mkdir(parents=True, exist_ok=True)
+        nbformat.write(notebook, folder / edition / path.name)
+        print(folder / edition / path.name)
+    (folder / "teachers" / IMAGES).mkdir(exist_ok=True)
+    for picture in (path.parent / IMAGES).glob(f"lesson-{path.stem[0]}-*.png"):
+        shutil.copy(picture, folder / "teachers" / IMAGES)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run some lessons, or all of them, and save their results; or write their editions."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -101,22 +156,17 @@ def main(arguments: list[str] | None = None) -> None:
         "notebooks", nargs="*", type=Path, metavar="NOTEBOOK", help="(default: all)"
     )
     parser.add_argument(
-        "--class-edition",
+        "--editions",
         type=Path,
         metavar="FOLDER",
-        help="write the notebooks there without results and solutions; run none",
+        help="write the editions for students and teachers there; run none",
     )
     settings = parser.parse_args(arguments)
-    paths, folder = settings.notebooks or sorted(FOLDER.glob("*.ipynb")), settings.class_edition
-    if folder is not None and folder.resolve() in {path.parent.resolve() for path in paths}:
-        parser.error(f"--class-edition {folder} would replace the lessons; choose another folder.")
-    for path in paths:
-        if folder is None:
+    for path in settings.notebooks or sorted(FOLDER.glob("*.ipynb")):
+        if settings.editions is None:
             _save(path, *executed(path))
         else:
-            folder.mkdir(parents=True, exist_ok=True)
-            nbformat.write(without_solutions(path), folder / path.name)
-            print(folder / path.name)
+            write_editions(path, settings.editions)
 
 
 def _save(path: Path, notebook: Any, pictures: dict[str, bytes]) -> None:

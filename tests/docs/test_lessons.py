@@ -65,7 +65,7 @@ def test_pictures_lie_beside_the_notebooks():
 @pytest.mark.parametrize(
     "path",
     [
-        pytest.param(path, marks=pytest.mark.slow if path.stem[0] == "1" else pytest.mark.long)
+        pytest.param(path, marks=pytest.mark.slow if path.stem[0] == "3" else pytest.mark.long)
         for path in LESSONS
     ],
     ids=lambda path: path.stem,
@@ -81,3 +81,39 @@ def test_run_afresh_it_says_the_same(path, kernels, monkeypatch):
         sizes = [Image.open(file).size for file in (io.BytesIO(picture), FOLDER / name)]
         assert sizes[0] == sizes[1]
     assert execute.INSTEAD in shown(afresh.cells)
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_both_editions_come_from_one_notebook(path, tmp_path):
+    """Students get every question and no result; their answers are folded. Teachers get it all."""
+    executor().write_editions(path, tmp_path)
+    students, teachers = (
+        cells_of(tmp_path / edition / path.name) for edition in ("students", "teachers")
+    )
+    saved = cells_of(path)
+    assert shown(saved)
+    assert not shown(students)
+    assert shown(teachers) == shown(saved)
+    for name in _REFERENCE.findall("\n".join(shown(teachers))):
+        assert (tmp_path / "teachers" / name[1]).is_file()
+
+    def texts(cells):
+        return "\n\n".join(cell["source"] for cell in cells)
+
+    assert "<details>" not in texts(teachers)
+    start = texts(students).index("## Solutions")
+    solutions = texts(students)[start:]
+    for cell in saved[[cell["source"] for cell in saved].index("## Solutions") :]:
+        assert cell["source"] in solutions
+    assert solutions.count("<details>") == solutions.count("</details>") >= 3
+    for cells in (saved, students):
+        predictions = [cell for cell in cells if cell["source"].startswith("*My ")]
+        assert texts(cells).count("**Question") == len(predictions) >= 5
+        assert texts(cells).count("**In the lab.**") == 1
+    for cell in saved:
+        if "yours" in cell["metadata"].get("tags", ()):
+            given, answer = cell["source"].split("# your turn\n")
+            [to_write] = [one["source"] for one in students if one["source"].startswith(given)]
+            assert answer not in to_write
+            assert answer in texts(students)
+            compile(to_write, path.name, "exec")
