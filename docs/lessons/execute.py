@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import base64
 import io
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -135,13 +136,15 @@ def for_teachers(path: Path) -> Any:
 
 
 def write_editions(path: Path, folder: Path) -> None:
-    """Write both editions of a lesson, and the pictures to which that for teachers refers."""
+    """Write both editions of a lesson, and the pages and pictures to which they refer."""
     import nbformat
 
     for edition, notebook in (("students", for_students(path)), ("teachers", for_teachers(path))):
         (folder / edition).mkdir(parents=True, exist_ok=True)
         nbformat.write(notebook, folder / edition / path.name)
         print(folder / edition / path.name)
+    for page in set(re.findall(r"\]\(\.\./([\w.]+)", path.read_text(encoding="utf-8"))):
+        shutil.copy(FOLDER.parent / page, folder)  # the lab, for example
     (folder / "teachers" / IMAGES).mkdir(exist_ok=True)
     for picture in (path.parent / IMAGES).glob(f"lesson-{path.stem[0]}-*.png"):
         shutil.copy(picture, folder / "teachers" / IMAGES)

@@ -13,6 +13,7 @@ from PIL import Image
 
 FOLDER = ROOT / "docs" / "lessons"
 LESSONS = sorted(FOLDER.glob("*.ipynb"))
+SCENES = re.findall(r'^    id: "(\w+)"', (ROOT / "lab/page/scenes.js").read_text("utf-8"), re.M)
 _REFERENCE = re.compile(r"!\[([^\]]+)\]\((images/[\w-]+\.png)\)")
 
 
@@ -65,7 +66,7 @@ def test_pictures_lie_beside_the_notebooks():
 @pytest.mark.parametrize(
     "path",
     [
-        pytest.param(path, marks=pytest.mark.slow if path.stem[0] == "3" else pytest.mark.long)
+        pytest.param(path, marks=pytest.mark.slow if path.stem[0] in "23" else pytest.mark.long)
         for path in LESSONS
     ],
     ids=lambda path: path.stem,
@@ -110,6 +111,10 @@ def test_both_editions_come_from_one_notebook(path, tmp_path):
         predictions = [cell for cell in cells if cell["source"].startswith("*My ")]
         assert texts(cells).count("**Question") == len(predictions) >= 5
         assert texts(cells).count("**In the lab.**") == 1
+        scenes = re.findall(r"\]\(\.\./lab.html#?(\w*)\)", texts(cells))
+        assert scenes
+        assert {*scenes} <= {"", *SCENES}
+    assert (tmp_path / "lab.html").is_file()
     for cell in saved:
         if "yours" in cell["metadata"].get("tags", ()):
             given, answer = cell["source"].split("# your turn\n")
