@@ -11,16 +11,17 @@ const HOMEWARD = { ...SCENE, rules: RULES.paper };
 const MIDDLE = { ...SCENE, seed: 88 };
 const stop = (tick) => [{ tick, do: "epsilon", value: 0 }, { tick, do: "learns", value: 0 }];
 
-/** A wall across the lanes of the meadow, as a path of cells: two cells up, one up and left, four times. */
-function wallPath() {
-  const R = WORLDS[0].radius, path = [[-3, 1]];
-  for (let k = 0; k < 12; k++) path.push([path[k][0] + (k % 3 < 2 ? 1 : 0), path[k][1] - (k % 3 < 2 ? 0 : 1)]);
-  return path.map(([q, r]) => (r + R) * (2 * R + 1) + q + R);
+/** A wall across the lanes of the meadow, as a path of cells: two cells up, one up and left, and so on. */
+export function wallPath(length = 13) {
+  const R = WORLDS[0].radius, path = [[0, 0]];
+  for (let k = 1; k < length; k++) path.push([path[k - 1][0] + (k % 3 ? 1 : 0), path[k - 1][1] - (k % 3 ? 0 : 1)]);
+  const [q0, r0] = path[length >> 1];
+  return path.map(([q, r]) => (r - r0 - 1 + R) * (2 * R + 1) + q - q0 + 1 + R);
 }
 const WALL = { tick: 600, do: "rock", reach: 1, path: wallPath() };
 
 /** How much of the traffic in the middle of the bridge takes the left, longer way. */
-function longShare({ engine }) {
+export function longShare({ engine }) {
   let long = 0, all = 0;
   for (let cell = 0; cell < engine.size; cell++) {
     const [x, y] = centre(engine.q(cell), engine.r(cell));
