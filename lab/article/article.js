@@ -59,8 +59,7 @@ class World {
     this.owed = 0;
     this.results[option] = null;
     this.canvas.setAttribute("aria-label", `A world of ants. ${piece.ask}: ${name}.`);
-    const code = encode(run.engine.first, run.engine.events);
-    this.figure.querySelector(".open").href = `lab.html${location.search}#${code}${skip ? `;${skip}` : ""}`;
+    this.code = encode(run.engine.first, run.engine.events) + (skip ? `;${skip}` : "");
     this.fit();
     this.tell();
     this.article.wake();
@@ -89,7 +88,8 @@ class World {
     if (!this.inView) return;
     this.painter = new Painter(this.canvas);
     this.painter.fit(this.run, this.article.theme);
-    this.draw(0);
+    this.draw(1); // a second: scent that eases in would not be seen while the world waits
+    this.figure.querySelector(".open").href = `lab.html${this.article.theme === "light" ? "?theme=light" : ""}#${this.code}`;
   }
 
   draw(passed) {

@@ -71,7 +71,7 @@ export const PIECES = {
       { tick: SETTLED, do: "erase", reach: 4, path: OLD_PILE }, { tick: SETTLED, do: "food", reach: 2, path: NEW_PILE }] }),
   },
   wall: {
-    ask: "The wall", options: [[0, "none"], [7, "short"], [13, "longer"], [19, "from rock to rock"]], from: 2,
+    ask: "The wall", options: [[0, "none"], [7, "short"], [13, "longer"], [23, "from rock to rock"]], from: 2,
     unit: "loads in the 600 ticks after it", ticks: 600, speed: 3, seed: 11,
     start: (length) => ({ scene: {}, skip: SETTLED, events: wall(length) }),
   },
