@@ -38,7 +38,10 @@ export class Address {
   /** Write what has happened into the address, soon. */
   save() {
     clearTimeout(this.saving);
-    this.saving = setTimeout(() => show(withoutMoment(this.lab.runs)), SAVE_MS);
+    this.saving = setTimeout(() => {
+      const { runs } = this.lab, prepared = runs.some((run) => run.start > 0); // ticks that nobody wants to watch
+      show(prepared ? visitOf(runs) : withoutMoment(runs));
+    }, SAVE_MS);
   }
 
   /** Write a name into the address: of a question, or of the daily map. */

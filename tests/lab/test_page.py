@@ -287,6 +287,17 @@ def test_two_halves_share_world_seed_and_strokes_and_differ_in_one_setting(opene
     page.tab.wait_for_function(f"{strokes}.every((drawn) => drawn.length)")
     left, right = page.read(strokes)
     assert left == right
+    page.tab.wait_for_function("location.hash.includes('~')")  # both halves are in the address
+
+
+@pytest.mark.browser
+def test_a_browser_without_simd_says_what_it_needs(browser):
+    context = browser.new_context(offline=True)
+    context.add_init_script("WebAssembly.Module = class { constructor() { throw Error('old'); } }")
+    tab = context.new_page()
+    tab.goto(FILE.as_uri())
+    assert tab.inner_text("#headline") == "This browser cannot run the lab."
+    context.close()
 
 
 @pytest.mark.browser
@@ -337,6 +348,7 @@ def test_a_course_page_steers_the_lab_in_a_frame(browser, tmp_path):
     facts = send(lab="strokes", strokes=[{"do": "rock", "reach": 1, "path": [[-3, 1], [5, -3]]}])
     assert facts["sides"][0]["wall"]["tick"] == tick
     assert send(lab="set", name="nest", value=1)["message"].startswith("set: nest is not one of")
+    assert send(lab="speed", value=100)["message"] == "speed: 100 is not between 0.1 and 64."
     assert send(lab="fly")["message"].startswith("fly is not one of")
     assert send(lab="start", scene="copies")["story"] == "ask-copies"
 
