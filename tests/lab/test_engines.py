@@ -40,6 +40,7 @@ def busy(ticks: int, radius: int = 32, ants: int = 200) -> list[dict[str, Any]]:
         {"tick": when[9], "do": "level", "value": 300},
         *drawn(when[10], "erase", 1, row(3, -2, 2, 6, radius)),
         {"tick": when[11], "do": "ants", "value": ants - 60},
+        {"tick": when[11] + 3, "do": "ants", "value": ants - 50},
     ]
 
 
