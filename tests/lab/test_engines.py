@@ -11,16 +11,17 @@ from lab_engines import replay_in_c
 from taichi_ants import lab
 
 LONGEST = 2000  # characters of the link of a usual visit
-Cells = list[int]
 
 
-def row(q: int, r: int, heading: int, n: int, radius: int = 32) -> Cells:
+def row(q: int, r: int, heading: int, n: int, radius: int = 32) -> list[int]:
     """The cells of a straight row in a world of the lab."""
     a, b = lab.STEPS[heading]
     return [(r + b * k + radius) * (2 * radius + 1) + q + a * k + radius for k in range(n)]
 
 
-def drawn(tick: int, does: str, reach: int, cells: Cells, speed: int = 3) -> list[dict[str, Any]]:
+def drawn(
+    tick: int, does: str, reach: int, cells: list[int], speed: int = 3
+) -> list[dict[str, Any]]:
     """A stroke of a visitor who draws some cells per tick."""
     parts = [cells[k : k + speed] for k in range(0, len(cells), speed)]
     return [{"tick": tick + k, "do": does, "reach": reach, "path": p} for k, p in enumerate(parts)]
