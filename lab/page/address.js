@@ -18,12 +18,18 @@ function show(text) {
   try { history.replaceState(null, "", `#${text}`); } catch { /* a frame without an address of its own */ }
 }
 
+/** Copy a text; return whether the browser allowed it. Pages in frames and files often need the old way. */
 async function copied(text) {
   try {
     await navigator.clipboard.writeText(text);
     return true;
   } catch {
-    return false;
+    const area = document.body.appendChild(document.createElement("textarea"));
+    area.value = text;
+    area.select();
+    const done = document.execCommand("copy");
+    area.remove();
+    return done;
   }
 }
 

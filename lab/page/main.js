@@ -224,7 +224,7 @@ class Lab {
 
   frame(now) {
     requestAnimationFrame((next) => this.frame(next));
-    const { ui } = this, passed = Math.min(0.1, (now - this.last) / 1000 || 0);
+    const { ui } = this, passed = Math.min(0.3, (now - this.last) / 1000 || 0);
     [this.last, ui.now] = [now, now];
     if (!this.fits) this.fit();
     for (const brush of this.brushes) brush.flush();
@@ -257,7 +257,7 @@ class Lab {
     byId("call").hidden = !told.call;
     if (byId("call").textContent !== (told.call || "")) byId("call").textContent = told.call || "";
     ui.hero = told.id === "food" ? run.facts.firstAnt : -1; // who found food first is marked until it is home
-    if (told.ghost && !ui.down) ui.ghost ||= run.suggestion();
+    if (told.ghost && !ui.down && !this.film.copy) ui.ghost ||= run.suggestion();
     else ui.ghost = null;
     byId("rate").textContent = many(run.perMinute);
     if (runs.length > 1) byId("rate-left").textContent = many(runs[0].perMinute);
