@@ -32,8 +32,8 @@ class Phase(NamedTuple):
     """A part of a tick that all ants, cells, states or worlds (`of`) finish together.
 
     It must not read values that another chunk writes in the same phase. `do` is a `ti.func` with
-    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place, tick) for CELLS, (c, v, w, first,
-    last) for STATES, a range of the states of all tables, and (c, v, w, tick) for WORLD.
+    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place, tick) for CELLS, (c, v, w, tick)
+    for WORLD. For STATES, a range of the states of all tables, they are (c, v, w, first, last).
     """
 
     of: str
