@@ -231,12 +231,8 @@ def _changes(event: Event, scene: dict[str, Any], colony: Colony) -> Iterator[ch
 
 def cells_within(event: Event, grid: AxialGrid) -> list[int]:
     """Return the flat indices of the cells within reach of the path of a stroke."""
-    around = range(-event.reach, event.reach + 1)
-    radius = grid.ranges[0]
-    disc = [(a, b) for a in around for b in around if distance(a, b) <= event.reach]
-    near = {(q + a, r + b) for q, r in event.path for a, b in disc}
-    inside = sorted(cell for cell in near if distance(*cell) < radius)
-    return [(r + radius) * grid.width + q + radius for q, r in inside]
+    near = [grid.distances((q, r, 0)) <= event.reach for q, r in event.path]
+    return np.flatnonzero(np.any(near, axis=0) & grid.exists).tolist()
 
 
 def state_hash(colony: Colony) -> str:

@@ -20,7 +20,7 @@ from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.features.support import COLONY
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.measures.series import Recorder
+from taichi_ants.measures.series import SeriesRecorder
 from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
 from taichi_ants.settings import Setting, flat
 from taichi_ants.task import Task
@@ -236,7 +236,7 @@ class ColonyPoint:
                 )
         if self.evaluation_epsilon is not None:
             arguments.checked_share("evaluation_epsilon", self.evaluation_epsilon)
-        Recorder(self.measures, self.measure_every)  # raises an error if it cannot read them
+        SeriesRecorder(self.measures, self.measure_every)  # raises an error if it cannot read them
         checked_whole("ticks", self.ticks, most=MAX_STEPS)
         object.__setattr__(self, "protocol", checked_protocol(self.protocol))
         check_one_of("during", self.during, DURING)

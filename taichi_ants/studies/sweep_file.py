@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ from taichi_ants.settings import (
     not_a_setting,
     settings_of_entry,
 )
-from taichi_ants.studies.design import Axis, Design, Range, settings_in
+from taichi_ants.studies.design import Axis, Design, Range
 from taichi_ants.studies.points import ColonyPoint, Drawn, FixedPolicy, Point, RunPoint
 from taichi_ants.task import Task
 
@@ -183,6 +183,16 @@ def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
 
 def as_list(value: Any) -> list:
     return value if isinstance(value, list) else [value]
+
+
+def settings_in(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the settings in nested tables: full names, with a list of values or a range's table."""
+    for name, value in tree.items():
+        path = f"{before}.{name}" if before else name
+        if isinstance(value, Mapping) and value and not value.keys() & {"from", "to"}:
+            yield from settings_in(value, path)
+        else:
+            yield path, value if isinstance(value, (Mapping, list)) else [value]
 
 
 def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:

@@ -56,8 +56,8 @@ def plain_calls(source: str) -> set[str]:
     functions = [node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]
     in_kernels = [node for node in functions if node.decorator_list]
     plain = {node.name for node in functions} - {node.name for node in in_kernels}
-    lines = [line for hook in in_kernels for line in hook.body]
-    calls = [node for line in lines for node in ast.walk(line) if isinstance(node, ast.Call)]
+    bodies = [line for hook in in_kernels for line in hook.body]
+    calls = [node for line in bodies for node in ast.walk(line) if isinstance(node, ast.Call)]
     return plain & {ast.unparse(call.func) for call in calls}
 
 

@@ -75,7 +75,6 @@ SETUPS = {
     "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="independent"),
     "nests": Setup(TWO_NESTS, tasks.foraging(), LEARNS, 20, 40, 3, 25),
     "rules": Setup("open", OWN, LEARNS, 20, world_settings=SMALL),
-    "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL),
 }
 BUMP = RULES.yours.pop("live_bump")  # registered only while the tests of this file run
 LATER = ("queueing", "lively")

@@ -80,6 +80,33 @@ def ant_view(a: Any, ant: Any) -> Named:
     return Named(read)
 
 
+class Part:
+    """A part of an array, from index `first` on, while a kernel compiles."""
+
+    def __init__(self, array: Any, first: Any) -> None:
+        self.array, self.first = array, first
+
+    def __getitem__(self, index: Any) -> Any:
+        return subscript(None, self.array, self.first + index)
+
+
+@while_compiling
+def parts_of(a: Any, numbers: tuple[str, ...]) -> Named:
+    """Return the arguments of a kernel, and the arrays that `layout.join` has joined, by name.
+
+    The array `numbers` has the arguments of these names.
+    """
+
+    def read(name: str) -> Any:
+        if name in numbers:
+            return subscript(None, a.numbers, numbers.index(name))
+        if hasattr(a, name):
+            return getattr(a, name)
+        return Part(a.memory, read(f"{name}_at"))
+
+    return Named(read)
+
+
 @ti.func
 def restore(a: ti.template(), base, origin, first, last):
     """Reset the cells from `first` to `last` of a run to those of its world."""

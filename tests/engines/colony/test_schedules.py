@@ -82,15 +82,13 @@ def test_any_number_of_chunks_gives_the_same(seeds, monkeypatch):
     for one in (expected, colony, in_kernel, by_numpy):
         one.begin_episode()
     monkeypatch.setattr(stepping, "_SORT_SECONDS", np.inf)
-    for number, chunks in enumerate((1, 2, 3, 5, 8, 16)):
+    for chunks, parts in zip((1, 2, 3, 5, 8, 16), (2, 1) * 3, strict=True):
         use_chunks(monkeypatch, chunks)
-        monkeypatch.setattr(
-            ThreadChoice, "plan", lambda _, ticks, most, n=number: (ticks, 1 + n % 2)
-        )
+        monkeypatch.setattr(ThreadChoice, "plan", lambda _, ticks, most, n=parts: (ticks, n))
         for one in (expected, colony, in_kernel, by_numpy):
             one.tick(9)
         assert_same({name: colony.arrays[name] for name in colony.stored}, expected.arrays)
-        in_kernel._launch_parts("sort", 0, 1 + number % 2)
+        in_kernel._launch_parts("sort", 0, parts)
         by_numpy.sort_ants()
         assert in_kernel == by_numpy
     assert (in_kernel.numbers != np.arange(30)).any(axis=1).all()

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from plain_measures import measured
+
 import taichi_ants.interventions as language
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_INTERVENTION
 from taichi_ants.protocol import At, Every, ProtocolEvent, When
@@ -13,7 +15,6 @@ from taichi_ants.reference.ants import Ant, start_order
 from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.features.castes import draw_caste
 from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells, normal_form
-from taichi_ants.reference.measures import measured
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
@@ -237,4 +238,4 @@ class Protocol:
         if tick == 0 or tick % event.interval or (event.once and number in self._happened):
             return False
         value = measured(self._colony, event.measure)
-        return value > event.above if event.above is not None else value < event.below  # type: ignore[operator]
+        return value > event.above if event.above is not None else value < event.below
