@@ -30,9 +30,9 @@ ANTS, CELLS, STATES, WORLD = "ants", "cells", "states", "world"
 class Phase(NamedTuple):
     """A part of a tick that all ants, cells, states or worlds (`of`) finish together.
 
-    It must not read values that another chunk writes in the same phase. `do` is a `ti.func` with
-    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place, tick) for CELLS, (c, v, w, first,
-    last) for STATES, a range of the states of all tables, and (c, v, w, tick) for WORLD.
+    It must not read values that another chunk writes in the same phase. `do` is a `ti.func`. Its
+    arguments are (c, v, w, chunk, ant, tick) for ANTS, (c, v, place, tick) for CELLS, and
+    (c, v, w, tick) for WORLD. For STATES they are (c, v, w, first, last), a range of the states.
     """
 
     of: str
