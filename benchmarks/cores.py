@@ -11,12 +11,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 
-import gymnasium
 import numpy as np
 from measuring import PAGE, machine, publish
 
 from taichi_ants import Colony, Task, TrainingConfig, runtime, train, worlds
 from taichi_ants.analysis.tables import MISSING, Table, figure, plain_text, thousands
+from taichi_ants.envs.forage import HexForageVectorEnv
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import foraging
 
@@ -82,8 +82,7 @@ def training(threads: int) -> float:
 
 def rollouts() -> Work:
     """Return work: random actions in 65 536 environments."""
-    options = {"num_envs": 65_536, "observation_format": "index"}
-    env = gymnasium.make_vec("taichi_ants/HexForage-v0", **options)
+    env = HexForageVectorEnv(num_envs=65_536, observation_format="index")
     env.reset(seed=0)
     length = 32
 

@@ -1,11 +1,12 @@
 """Compare the speed of vector environments with that of the engine of `taichi_ants.train`.
 
-All ants act at random in the paper's world. `step` and `rollout` get actions that were drawn
-before. "policy" is a rollout that draws them itself, as the engine does, with epsilon 1. Rollouts
-have up to two million steps of all environments. The command measures all in turn, several times.
-The table contains medians: steps per second by the wall clock, and processor time per step of all
-threads together. Ratios are those of the engine's processor time, which other programs hardly
-change, and of its wall-clock time.
+All ants act at random in the paper's world. "1 step" is one environment of `gymnasium.make`, and
+"CartPole" one of Gymnasium's own. `step` and `rollout` get actions that were drawn before. "policy"
+is a rollout that draws them itself, as the engine does, with epsilon 1. Rollouts have up to two
+million steps of all environments. The command measures all in turn, several times. The table
+contains medians: steps per second by the wall clock, and processor time per step of all threads
+together. Ratios are those of the engine's processor time, which other programs hardly change, and
+of its wall-clock time.
 """
 
 from __future__ import annotations
@@ -70,16 +71,20 @@ def vector(num_envs: int) -> dict[str, Callable[[], int]]:
     return {f"{num_envs} {one.__name__}": one for one in (step, rollout, policy)}
 
 
-def single() -> int:
-    """Return the steps of one environment, with all wrappers of `gymnasium.make`."""
-    env = gymnasium.make(ID)
-    env.reset(seed=0)
-    actions = np.random.default_rng(0).integers(0, 5, 20_000).tolist()
-    for action in actions:
-        _, _, terminated, truncated, _ = env.step(action)
-        if terminated or truncated:
-            env.reset()
-    return len(actions)
+def single(name: str) -> Callable[[], int]:
+    """Return a function that steps one environment, with all wrappers of `gymnasium.make`."""
+    env = gymnasium.make(name)
+    actions = np.random.default_rng(0).integers(0, env.action_space.n, 20_000).tolist()
+
+    def step() -> int:
+        env.reset(seed=0)
+        for action in actions:
+            _, _, terminated, truncated, _ = env.step(action)
+            if terminated or truncated:
+                env.reset()
+        return len(actions)
+
+    return step
 
 
 def measure(num_envs: list[int], rounds: int, threads: int | None) -> None:
@@ -87,7 +92,11 @@ def measure(num_envs: list[int], rounds: int, threads: int | None) -> None:
     runtime.start(threads)
     import taichi_ants.envs  # noqa: F401 (registers)
 
-    subjects: dict[str, Callable[[], int]] = {"engine": engine, "1 step": single}
+    subjects: dict[str, Callable[[], int]] = {
+        "engine": engine,
+        "1 step": single(ID),
+        "CartPole": single("CartPole-v1"),
+    }
     for n in num_envs:
         subjects |= vector(n) if n > 1 else {}
     for subject in subjects.values():

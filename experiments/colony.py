@@ -357,7 +357,7 @@ def _statements(judged: study.Judged) -> page.Statements:
     for (world_kind, series), by_sizes in judged.items():
         unit = COLONY[series.measure].label
         told = [
-            page.Shown(
+            page.ShownFinding(
                 count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit
             )
             for (n, less), one in by_sizes.items()

@@ -52,9 +52,9 @@ def check_ranges(worlds: Sequence[World]) -> None:
 
 
 def checked_worlds(
-    world: World | Sequence[World], n_seeds: int, learns: bool, n_kinds: int, n_nests: int = 0
+    world: World | Sequence[World], n_seeds: int, learns: bool, n_nests: int = 0
 ) -> tuple[World, ...]:
-    """Return one world per seed for a colony with some kinds of food, and nests, if not 0.
+    """Return one world per seed for a colony, with the same number of nests, if not 0.
 
     AntsError if their number is wrong, or one does not fit.
     """
@@ -71,11 +71,6 @@ def checked_worlds(
             raise AntsError(
                 f"a world has {count(one.n_nests, 'nest')}, but another one {n_nests}; all worlds "
                 "of a colony must have the same number."
-            )
-        if one.n_food_kinds > n_kinds:
-            raise AntsError(
-                f"the world has {count(one.n_food_kinds, 'kind')} of food, but the task "
-                f"{n_kinds}; add the others to `task.foods`."
             )
     return worlds
 
@@ -137,10 +132,10 @@ def checked_training(
     """Return the training of a colony, complete, or None if there are no action values."""
     learns = sharing != "frozen"
     if training is None and not learns and not has_table:
-        if task.choice.needs_table:
+        if task.needs_table:
             refuse_unsupported("a colony with given actions", task.uses(), BASE - CASTES)
         return None
-    if not task.choice.needs_table:
+    if not task.needs_table:
         raise AntsError(
             f"`task.choice.rule` is {task.choice.rule!r}, so ants choose without action values, "
             f"but sharing is {shown(sharing)} and there is a training or q_values; set sharing to "

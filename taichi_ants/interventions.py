@@ -21,11 +21,11 @@ import numpy as np
 from taichi_ants import settings
 from taichi_ants.errors import AntsError, as_array, check_one_of, count, entries_of, is_flag, refuse
 from taichi_ants.features import FEATURES
+from taichi_ants.features.fields import TRAIL
+from taichi_ants.features.pheromone import MAX_DEPOSIT
 from taichi_ants.settings import Setting, Settings, Share, declared
 from taichi_ants.task import Task
-from taichi_ants.task.field import TRAIL
 from taichi_ants.task.model import Model
-from taichi_ants.task.pheromone import MAX_DEPOSIT
 
 if TYPE_CHECKING:
     from taichi_ants.grid.hexgrid import AxialGrid
@@ -251,7 +251,7 @@ class SetTrail(Intervention, path="trail", short_for=("level",)):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
-        check_one_of("`trail.field`", self.field, (TRAIL, *task.fields))
+        check_one_of("`trail.field`", self.field, (*task.pheromones,))
 
 
 @dataclass(frozen=True)

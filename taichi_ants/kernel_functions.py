@@ -9,8 +9,8 @@ from inspect import signature
 from typing import Any
 
 Function = Callable[..., Any]
-# The arguments that are no values of the kernel: a view of an ant or nest, and the arrays of a run.
-TEMPLATES = {"a", "nest", "memory"}
+# The arguments that are no values of the kernel: views of ants, nests and cells, arrays of a run.
+TEMPLATES = {"a", "nest", "cell", "memory"}
 
 
 class KernelFunction:

@@ -231,12 +231,8 @@ def _changes(event: Event, scene: dict[str, Any], colony: Colony) -> Iterator[ch
 
 def cells_within(event: Event, grid: AxialGrid) -> list[int]:
     """Return the flat indices of the cells within reach of the path of a stroke."""
-    around = range(-event.reach, event.reach + 1)
-    radius = grid.ranges[0]
-    disc = [(a, b) for a in around for b in around if distance(a, b) <= event.reach]
-    near = {(q + a, r + b) for q, r in event.path for a, b in disc}
-    inside = sorted(cell for cell in near if distance(*cell) < radius)
-    return [(r + radius) * grid.width + q + radius for q, r in inside]
+    near = [grid.distances((q, r, 0)) <= event.reach for q, r in event.path]
+    return np.flatnonzero(np.any(near, axis=0) & grid.exists).tolist()
 
 
 def state_hash(colony: Colony) -> str:
@@ -247,11 +243,11 @@ def state_hash(colony: Colony) -> str:
     """
     slots = np.flatnonzero(colony.living[0])
     slots = slots[np.argsort(colony.numbers[0, slots])]
-    cells, headings, loads, streams = (
+    cells, headings, carry, streams = (
         column[0, slots].astype(np.uint64).tolist()
         for column in (colony.cells, colony.headings, colony.carrying, colony.streams)
     )
-    ants = zip(cells, headings, loads, streams, strict=True)
+    ants = zip(cells, headings, carry, streams, strict=True)
     words = [word for cell, h, load, s in ants for word in (cell << 8 | h << 1 | load, s)]
     stored, clock = colony.stored_pheromone(0, 0)
     levels = np.maximum(stored.astype(np.int64) - clock, 0)

@@ -12,12 +12,13 @@ from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.own_rules import difference
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features import FEATURES
+from taichi_ants.features.fields import OCCASIONS, TRAIL
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.rules.rule import Rule, drawn_parameters
+from taichi_ants.rules import Rule
+from taichi_ants.rules.rule import drawn_parameters
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.task.field import OCCASIONS, TRAIL
 from taichi_ants.worlds import World
 
 SEEDS, TICKS = 6, 60
@@ -152,7 +153,7 @@ def _world(seed: int) -> World:
 def _colonies(task: Task, seed: int) -> tuple[Colony, ReferenceColony]:
     """Return a drawn colony and its reference at the start of an episode."""
     world = _world(seed)
-    learner = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 1.0) if task.choice.needs_table else None
+    learner = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 1.0) if task.needs_table else None
     sharing = "frozen" if learner is None else "shared"
     schedule = ("by_world", "by_chunk")[seed % 2]
     colony = Colony(world, task, learner, seed, 12, sharing=sharing, schedule=schedule)

@@ -45,9 +45,10 @@ def _inside_class(level_of_class_stackframe: int) -> bool:
 
 
 def pytest_collection_finish() -> None:
-    """Exclude what lives until the end from garbage collection: modules, tests, parameters."""
+    """Exclude modules, tests and parameters from garbage collection; collect the rest rarely."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000)
 
 
 @pytest.fixture(scope="session")

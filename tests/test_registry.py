@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from taichi_ants import AntsError, learners, measures, rules, worlds
+from taichi_ants.features.rule import RULES
 from taichi_ants.learners.q_learning import td_error
 from taichi_ants.learners.registry import LEARNERS
 from taichi_ants.measures.measure import MEASURES
-from taichi_ants.rules.rule import RULES
 from taichi_ants.task import Observation, observations
 from taichi_ants.task.observations.observation import OBSERVATIONS
 from taichi_ants.worlds.registry import WORLDS

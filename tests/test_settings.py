@@ -19,9 +19,9 @@ import pytest
 from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig, learners
+from taichi_ants.features.rule import RULES
 from taichi_ants.interventions import INTERVENTIONS, Clear
 from taichi_ants.protocol import EVENTS as EVENTS_BY_NAME
-from taichi_ants.rules.rule import RULES
 from taichi_ants.settings import (
     DeclaredSetting,
     Named,

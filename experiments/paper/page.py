@@ -21,7 +21,7 @@ from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
 from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
-from taichi_ants.report.page import Picture, Player, Shown, Statement, Statements, fill
+from taichi_ants.report.page import Picture, Player, ShownFinding, Statement, Statements, fill
 from taichi_ants.studies.command_line import progress_bar
 from taichi_ants.studies.points import RunPoint
 from taichi_ants.task import Task
@@ -158,7 +158,7 @@ def _claims(comparison: Comparison, audit: Audit) -> Statements:
     lines = []
     for claim, findings in audit.items():
         told = [
-            Shown(f"delivery {setting}", one, one.contrast.label, claim.quantity.unit)
+            ShownFinding(f"delivery {setting}", one, one.contrast.label, claim.quantity.unit)
             for setting, one in findings.items()
         ]
         facts = {"Tested on": claim.tested_on, "Criterion": claim.asked}

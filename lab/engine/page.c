@@ -168,19 +168,32 @@ static void list_aside(void)
                         aside[n_aside][0] = x - z, aside[n_aside++][1] = y - z;
 }
 
-static void pack(void)
+/* Write what a frame shows of the cells. */
+EXPORT void pack_cells(void)
 {
     for (int i = 0; i < G.size; i++) {
-        int level = level_of(&C, i, tick), shown = level >= C.level ? 255 : level * 255 / C.level;
+        int level = C.trail[i] - tick;
+        page.levels[i] = level <= 0 ? 0 : level >= C.level ? 255 : 1 + level * 254 / C.level;
         page.ground[i] = C.ground[i] & 15;
-        page.levels[i] = shown ? shown : level > 0;
     }
+}
+
+/* Write what a frame shows of the ants. */
+static void pack_ants(void)
+{
     for (int i = 0; i < C.n; i++) {
         const Ant *ant = W.ants + i;
         page.headings[i] = ant->heading;
         page.looks[i] = ant->carries | ant->event << 1 | ant->action << 4;
         page.states[i] = state_of(rules, ant);
     }
+}
+
+/* Let ants observe anew after an intervention. */
+static void look(void)
+{
+    look_around(&C, &W, rules, tick);
+    pack_ants();
 }
 
 /* Set the table to the values that the page has written; FROZEN ants act by it. */
@@ -208,8 +221,7 @@ EXPORT void begin(uint32_t low, uint32_t high, int n, float first)
                     below(stream_of(seed, STREAM_START_HEADING, C.n) >> 32, N_HEADINGS),
                     stream_of(seed, STREAM_ANT, C.n));
     interventions = stream_of(seed, STREAM_INTERVENTION, 0);
-    look_around(&C, &W, rules, 0);
-    pack();
+    look();
 }
 
 EXPORT void pass(int ticks)
@@ -225,7 +237,7 @@ EXPORT void pass(int ticks)
         for (int i = 0; tick % TICKS_TO_FADE == 0 && i < G.size; i++)
             page.traffic[i] *= 0.82f;
     }
-    pack();
+    pack_ants();
 }
 
 /* ---- Interventions ------------------------------------------------------------------------- */
@@ -266,8 +278,7 @@ EXPORT void put(int n, int what)
         else if (what != FOOD)
             remove_source(cell);
     }
-    look_around(&C, &W, rules, tick);
-    pack();
+    look();
 }
 
 /* Set the scent of the n cells in `brush`; 0 removes it. */
@@ -276,8 +287,7 @@ EXPORT void lay_scent(int n, int level)
     for (int k = 0; k < n; k++)
         if (exists(&G, page.brush[k]) && C.ground[page.brush[k]] != OBSTACLE)
             C.trail[page.brush[k]] = level ? tick + level : 0;
-    look_around(&C, &W, rules, tick);
-    pack();
+    look();
 }
 
 /* The most ants that can live now. */
@@ -300,8 +310,7 @@ EXPORT void set_ants(int n)
             add_ant(start_cells[k], below(bits_of(interventions) >> 32, N_HEADINGS),
                     stream_of(seed, STREAM_BORN, next_number++));
         }
-    look_around(&C, &W, rules, tick);
-    pack();
+    look();
 }
 
 /* ---- What the page reads ------------------------------------------------------------------- */

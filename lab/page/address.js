@@ -18,12 +18,18 @@ function show(text) {
   try { history.replaceState(null, "", `#${text}`); } catch { /* a frame without an address of its own */ }
 }
 
+/** Copy a text; return whether the browser allowed it. Pages in frames and files often need the old way. */
 async function copied(text) {
   try {
     await navigator.clipboard.writeText(text);
     return true;
   } catch {
-    return false;
+    const area = document.body.appendChild(document.createElement("textarea"));
+    area.value = text;
+    area.select();
+    const done = document.execCommand("copy");
+    area.remove();
+    return done;
   }
 }
 
@@ -38,7 +44,10 @@ export class Address {
   /** Write what has happened into the address, soon. */
   save() {
     clearTimeout(this.saving);
-    this.saving = setTimeout(() => show(withoutMoment(this.lab.runs)), SAVE_MS);
+    this.saving = setTimeout(() => {
+      const { runs } = this.lab, prepared = runs.some((run) => run.start > 0); // ticks that nobody wants to watch
+      show(prepared ? visitOf(runs) : withoutMoment(runs));
+    }, SAVE_MS);
   }
 
   /** Write a name into the address: of a question, or of the daily map. */

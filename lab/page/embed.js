@@ -1,6 +1,7 @@
 /* embed.js: the lab in a frame of another page, which can steer it by messages.
  *
  *   frame.contentWindow.postMessage({ lab: "start", scene: "copies" }, "*")    a question by its name, or a link's code
+ *   { lab: "say", option: 0 }                       the prediction that a question waits for; it then runs
  *   { lab: "play" }, { lab: "pause" }, { lab: "speed", value: 4 }, { lab: "undo" }
  *   { lab: "set", name: "epsilon", value: 0.1 }     a setting, as in engine.js
  *   { lab: "strokes", strokes: [{ do: "rock", reach: 1, path: [[q, r], ...] }] }
@@ -43,6 +44,10 @@ export class Embed {
     };
     const acts = {
       start: () => (data.scene ? lab.address.open(String(data.scene)) : lab.begin()),
+      say: () => {
+        if (!lab.question || lab.question.said >= 0) throw new Error("say: no question is waiting for a prediction.");
+        lab.say(number(data.option, 0, lab.question.options.length - 1));
+      },
       play: () => lab.play(true),
       pause: () => lab.play(false),
       speed: () => { lab.ui.speed = number(data.value, 0.1, 64); },

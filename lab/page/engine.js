@@ -21,7 +21,7 @@
  *   engine.changed        true after ground has changed by `apply`; the page sets it to false
  *   engine.hash()         16 hexadecimal digits: two engines with the same hash have the same state
  *
- * A frame is in these arrays after each `pass` and `apply`; they keep their place in memory:
+ * A frame is in these arrays after each `pass` and `apply`. Read `ground` and `levels` anew for each:
  *   by cell: ground (EMPTY, ROCK, FOOD, QUEEN; ants stand on ROCK), levels (0..255 of the scent),
  *            traffic (carriers of the last ticks, fading by 1 %)
  *   by ant:  cells, before, before2 (cells now, one and two ticks ago), headings (0..5),
@@ -42,7 +42,7 @@
  *   lone.train({ learner, rate, discount, epsilon, decay, planningSteps, truncates, seeds, episodes,
  *                maxSteps }) -> { returns, steps, deliveries }, each Int32Array (seeds * episodes);
  *   lone.values   the tables of the last call, Float32Array (seeds * 640)
- *   GRID is the paper's grid, 128 settings for `train`; 100 seeds of one take about 0.15 s
+ *   GRID is the paper's grid, 128 settings for `train`; 100 seeds of one take about 0.2 s
  */
 
 import { FOLLOWERS, makeWorld } from "./worlds.js";
@@ -99,6 +99,7 @@ export class Engine {
     /** @type {Change[]} */
     this.events = [];
     this.changed = true;
+    this.stale = true;
     const R = this.radius = this.world.radius;
     this.width = 2 * R + 1;
     this.size = this.width * this.width;
@@ -125,8 +126,8 @@ export class Engine {
     const at = (k, Kind, n) => new Kind(this.wasm.memory.buffer, this.wasm.array(k), n);
     const n = CAPACITY;
     this.laid = at(0, Uint8Array, this.size); // with ants; `ground` is that of the frame
-    this.ground = at(1, Uint8Array, this.size);
-    this.levels = at(2, Uint8Array, this.size);
+    this.shownGround = at(1, Uint8Array, this.size);
+    this.shownLevels = at(2, Uint8Array, this.size);
     this.traffic = at(3, Float32Array, this.size);
     this.brush = at(4, Int32Array, this.size);
     this.cells = at(5, Int32Array, n);
@@ -137,6 +138,15 @@ export class Engine {
     this.states = at(10, Uint16Array, n);
     this.values = at(11, Float32Array, 8 * this.wasm.states());
     this.read = at(12, Int32Array, 16);
+  }
+
+  // Cells are only packed when somebody looks at them.
+  get ground() { return this.packed().shownGround; }
+  get levels() { return this.packed().shownLevels; }
+  packed() {
+    if (this.stale) this.wasm.pack_cells();
+    this.stale = false;
+    return this;
   }
 
   get tick() { return this.wasm.ticks_passed(); }
@@ -168,6 +178,7 @@ export class Engine {
       this.settle();
       const next = this.later.length ? this.later[0].tick : end;
       this.wasm.pass(Math.min(end, next) - this.tick);
+      this.stale = true;
     }
     this.settle();
   }
@@ -184,6 +195,7 @@ export class Engine {
    * @param {Change} change
    */
   apply(change) {
+    this.stale = true;
     if ("path" in change) {
       for (const path of this.rows(change.path)) {
         this.paint({ ...change, path });

@@ -8,6 +8,7 @@ const TYPES = ["video/mp4;codecs=avc1.42E01F", "video/mp4", "video/webm;codecs=v
 export class Film {
   constructor(lab) {
     this.lab = lab;
+    this.copy = null; // the canvas that is recorded now
     byId("film").addEventListener("click", () => this.start());
   }
 

@@ -48,7 +48,6 @@ class Lab {
       return { view, canvas, caption: view.querySelector("figcaption"), painter: new Painter(canvas), run: null };
     });
     this.plot = new Plot(byId("plot"));
-    this.frames = []; // [ms at which a frame began, ms of drawing]
     this.owed = 0;    // ticks that are due
     this.last = 0;    // ms of the last frame, of the last words, and of the first frame
     this.wordsAt = 0;
@@ -100,7 +99,8 @@ class Lab {
     });
     byId("views").classList.toggle("two", starts.length > 1);
     byId("other").hidden = starts.length < 2;
-    byId("unit").innerHTML = starts.length < 2 ? "food per <br>minute" : "right, per <br>minute";
+    byId("figures").classList.toggle("two", starts.length > 1);
+    byId("unit").innerHTML = starts.length < 2 ? "food per <br>minute" : "right, per minute";
     Object.assign(this.ui, { followed: -1, hero: -1, ghost: null });
     this.plot.reset();
     [this.told, this.owed, this.fits] = ["", 0, false];
@@ -224,7 +224,7 @@ class Lab {
 
   frame(now) {
     requestAnimationFrame((next) => this.frame(next));
-    const { ui } = this, passed = Math.min(0.1, (now - this.last) / 1000 || 0);
+    const { ui } = this, passed = Math.min(0.3, (now - this.last) / 1000 || 0);
     [this.last, ui.now] = [now, now];
     if (!this.fits) this.fit();
     for (const brush of this.brushes) brush.flush();
@@ -235,12 +235,9 @@ class Lab {
         if (performance.now() > until) this.owed = 1;
       }
     }
-    const began = performance.now();
     for (const { painter, run } of this.sides) if (run) painter.frame(ui.speed > 3 ? 1 : this.owed, passed, ui);
     this.firstFrame ||= performance.now(); // ms since the page was opened
     this.film.add();
-    this.frames.push([now, performance.now() - began]);
-    if (this.frames.length > 120) this.frames.shift();
     if (now - this.wordsAt > WORDS_MS) {
       this.wordsAt = now;
       this.words();
@@ -248,6 +245,7 @@ class Lab {
   }
 
   words() {
+    if (!this.fits) this.fit();
     const { ui } = this, runs = this.runs, run = runs[runs.length - 1];
     /** @type {import("./story.js").Story} */
     const told = this.question ? questionStory(this.question, runs) : Daily.is(run) ? this.daily.story(run) : storyOf(run);
@@ -259,7 +257,7 @@ class Lab {
     byId("call").hidden = !told.call;
     if (byId("call").textContent !== (told.call || "")) byId("call").textContent = told.call || "";
     ui.hero = told.id === "food" ? run.facts.firstAnt : -1; // who found food first is marked until it is home
-    if (told.ghost && !ui.down) ui.ghost ||= run.suggestion();
+    if (told.ghost && !ui.down && !this.film.copy) ui.ghost ||= run.suggestion();
     else ui.ghost = null;
     byId("rate").textContent = many(run.perMinute);
     if (runs.length > 1) byId("rate-left").textContent = many(runs[0].perMinute);
@@ -319,10 +317,20 @@ class Lab {
   }
 }
 
-const lab = new Lab();
-lab.play(true);
-lab.setTheme(/theme=light/.test(location.search) ? "light" : "dark"); // light scent needs dark ground
-lab.address.open();
-new Embed(lab);
-Object.assign(window, { lab });
-requestAnimationFrame((now) => lab.frame(now));
+function start() {
+  const lab = new Lab();
+  lab.play(true);
+  lab.setTheme(/theme=light/.test(location.search) ? "light" : "dark"); // dark by default: bright scent needs dark ground
+  lab.address.open();
+  new Embed(lab);
+  Object.assign(window, { lab });
+  requestAnimationFrame((now) => lab.frame(now));
+}
+
+try {
+  start();
+} catch (error) {
+  byId("headline").textContent = "This browser cannot run the lab.";
+  byId("sub").textContent = "It needs WebAssembly with SIMD. Please update the browser, or try another one.";
+  throw error;
+}

@@ -93,7 +93,7 @@ export const QUESTIONS = [
   },
   {
     id: "wall", title: "A wall in mid-learning", ticks: 1000, speed: 4,
-    ask: "A wall. Who finds a way round?", options: ["Those that still learn", "Those that stopped", "Both alike"],
+    ask: "Who finds a way round?", options: ["Those that still learn", "Those that stopped", "Both alike"],
     sub: "A wall has just been drawn across both lanes. At the same moment, the ants on the right stop learning.",
     sides: [{ label: "still learn", scene: MIDDLE, events: [WALL], skip: 600 },
             { label: "learn nothing more", scene: MIDDLE, events: [WALL, { tick: 600, do: "learns", value: 0 }], skip: 600 }],
@@ -111,8 +111,9 @@ export const QUESTIONS = [
     sides: [{ label: "3 % random steps", scene: SCENE }, { label: "20 % random steps", scene: { ...SCENE, epsilon: 0.2 } }],
     answer: ([left, right]) => {
       const ratio = right.food / Math.max(1, left.food);
-      return { right: ratio > 1.1 ? 0 : ratio < 0.9 ? 2 : 1, head: `${many(right.food)} against ${many(left.food)}.`,
-               sub: "Random steps find food, and lose the way. Now change any setting: it applies to the right half only." };
+      return { right: ratio > 1.1 ? 0 : ratio < 0.9 ? 2 : 1, head: ratio > 1.1 ? "Random steps pay." : ratio < 0.9 ? "Random steps cost food." : "It hardly matters.",
+               sub: `Right ${bold(many(right.food))}, left ${bold(many(left.food))} loads. Random steps find food, and lose the way. `
+                 + "Now change any setting: it applies to the right half only." };
     },
   },
 ];

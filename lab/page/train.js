@@ -131,6 +131,7 @@ export class Training {
   async grid() {
     const bar = byId("t-bar"), began = performance.now(), rows = [];
     bar.hidden = false;
+    byId("t-results").textContent = "";
     await this.train(GRID, ({ returns, deliveries }, setting) => {
       const [points, home] = [lastOf(returns, SEEDS), lastOf(deliveries, SEEDS)];
       rows.push({ setting, mean: mean(points), iqm: interquartileMean(points), home: interquartileMean(home) });

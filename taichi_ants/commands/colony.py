@@ -124,7 +124,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     policy = load_policy(settings.policy) if settings.policy else None
     task = rules(settings, policy)
     training = given.get("training", {})
-    learns = task.choice.needs_table or bool(policy or training)
+    learns = task.needs_table or bool(policy or training)
     names = ("ants", "capacity", "start", "sharing", "threads", "arch")
     options: dict[str, Any] = {name: getattr(settings, name) for name in names}
     seeds = range(settings.seed, settings.seed + settings.colonies)

@@ -44,6 +44,16 @@ class Launch:
         for name, value in values.items():
             if self._known[name] is not value:
                 self._set(name, value)
+        self._launch()
+
+    def repeat(self, values: Mapping[str, Any]) -> None:
+        """Launch with the values of the last launch, the same objects, without comparing them."""
+        if self._taichi() is ti.lang.impl.get_runtime():
+            self._launch()
+        else:
+            self(values)
+
+    def _launch(self) -> None:
         if self._compiled is None:
             self._kernel(self._pack)
         else:

@@ -7,7 +7,9 @@ bits. This module does not import Taichi.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import IntEnum, auto
+from typing import Any
 
 import numpy as np
 
@@ -62,6 +64,24 @@ def unpack_cells(packed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the ground, uint8 (n,), and the stored trails, int32 (n,), of packed cells (n,)."""
     ground = np.where(packed >= 0, EMPTY, packed + _OCCUPIED).astype(np.uint8)
     return ground, np.maximum(packed, 0)
+
+
+def join(arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Return int32 arrays as one, `memory`, and where each begins, `name_at`; see `split`.
+
+    A launch takes 0.6 microseconds for each array. Kernels read the parts by `runs.step.parts_of`.
+    """
+    ends = np.cumsum([array.size for array in arrays.values()]).tolist()
+    places = {f"{name}_at": end for name, end in zip(arrays, [0, *ends], strict=False)}
+    memory = np.concatenate([array.reshape(-1) for array in arrays.values()], dtype=np.int32)
+    return {"memory": memory, **places}
+
+
+def split(joined: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Return the arrays that `join` has joined, by name, as flat views."""
+    memory, *names = joined
+    parts = np.split(joined[memory], [joined[name] for name in names[1:]])
+    return {name.removesuffix("_at"): part for name, part in zip(names, parts, strict=True)}
 
 
 def compass_of(grid: AxialGrid) -> np.ndarray:

@@ -15,9 +15,10 @@ from taichi.lang.impl import subscript
 from taichi_ants import runtime
 from taichi_ants.arithmetic.numbers import exponential, logarithm, power
 from taichi_ants.engines.launch import last_line
+from taichi_ants.features.rule import Rule
 from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.rules.inputs import KINDS, values_shown
-from taichi_ants.rules.rule import TRIES, Rule, tries
+from taichi_ants.rules.rule import TRIES, tries
 
 
 @ti.func

@@ -36,10 +36,12 @@ from taichi_ants.learners.policies import checked_table, frozen_policy
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, N_ACTIONS
 
+_WHOLE = (int, np.int64)  # the types of most actions
 SUPPORTS = LONE - CHOICE - {"choice.rule=softmax"}  # actions are given
 DELIVERIES = ("terminates", "truncates", "continues")
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
+_NUMBERS_OF_ANT = 24  # at least those in `BatchedEnvironments` beside the cells
 # The command to an ant after the last step of an episode.
 _AFTER_END = {
     AutoresetMode.SAME_STEP: Command.STEP,
@@ -59,7 +61,7 @@ class LoneAnts(Ants):
         task = self.task
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
-        most = _MOST_CELLS // self.worlds[0].grid.size
+        most = _MOST_CELLS // (self.worlds[0].grid.size + _NUMBERS_OF_ANT)
         checked_whole("num_envs", n, 1, most, " for a world of this size")
         self.batched = BatchedEnvironments(
             self.worlds, task, n, self.max_steps, delivery, task.evaporation_in_training
@@ -157,7 +159,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
     ) -> None:
         arguments = Arguments(world, task, max_steps, observation_format, render_mode)
         self._ants = LoneAnts(1, delivery, arguments)
-        self._arrays, self.render_mode = self._ants.batched.arrays, render_mode
+        self.render_mode = render_mode
         self.observation_space, self.action_space = self._ants.shown.space, Discrete(N_ACTIONS)
 
     def reset(
@@ -173,7 +175,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
             seed = int(self.np_random.integers(2**63))
         self._ants.begin(np.ones(1, bool), [seed])
         self._ants.begun = True
-        return self._seen()
+        return self._seen()[:2]
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Take an action, 0 to 4.
@@ -185,31 +187,39 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
             ResetNeeded: No episode has begun, or it has ended.
             InvalidAction: The action does not exist.
         """
-        self._ants.check_begun("step()")
-        if self._arrays["results"][0] >= TRUNCATED:
+        ants = self._ants
+        batched = ants.batched
+        ants.check_begun("step()")
+        if batched.arrays["results"][0] >= TRUNCATED:
             raise ResetNeeded("the episode has ended; call reset() before step().")
-        if not self.action_space.contains(action):
+        known = type(action) in _WHOLE and 0 <= action < N_ACTIONS
+        if not known and not self.action_space.contains(action):  # which takes a microsecond
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
-        self._ants.batched.step(action)
-        arrays = self._arrays
-        result, reward = int(arrays["results"][0]), float(arrays["rewards_of"][0])
-        observation, info = self._seen()
+        batched.step(action)
+        observation, info, result = self._seen()
+        reward = float(batched.arrays["rewards_of"][0])
         return observation, reward, result & TERMINATED != 0, result & TRUNCATED != 0, info
 
-    def _seen(self) -> tuple[Any, dict[str, Any]]:
-        arrays = self._arrays
-        return self._ants.shown.show(arrays["states"])[0], {
-            "state": np.int64(arrays["states"][0]),
-            "action_mask": ACTION_MASKS[arrays["paper_states"][0]].copy(),
-            "event": np.int64(arrays["results"][0] & (TRUNCATED - 1)),
-            "reason": np.int64(arrays["reasons"][0]),
-            "deliveries": np.int64(arrays["deliveries"][0]),
-        }
+    def _seen(self) -> tuple[Any, dict[str, Any], int]:
+        """Return the observation, the info and the result of the last step."""
+        ants, whole_number = self._ants, np.int64
+        state, paper_state, result, reason, deliveries = ants.batched.shown[:, 0].tolist()
+        return (
+            ants.shown.table[state].copy(),
+            {
+                "state": whole_number(state),
+                "action_mask": ACTION_MASKS[paper_state].copy(),
+                "event": whole_number(result & (TRUNCATED - 1)),
+                "reason": whole_number(reason),
+                "deliveries": whole_number(deliveries),
+            },
+            result,
+        )
 
     def action_masks(self) -> np.ndarray:
         """Return `info["action_mask"]` as bool (5,), for MaskablePPO of sb3-contrib."""
         self._ants.check_begun("action_masks()")
-        return ACTION_MASKS[self._arrays["paper_states"][0]].astype(bool)
+        return ACTION_MASKS[self._ants.batched.arrays["paper_states"][0]].astype(bool)
 
     def render(self) -> Any:
         """Return a picture, uint8 (720, 1280, 3), or None without a render mode."""

@@ -19,7 +19,7 @@ ObservationFormat = Literal["cells", "index", "one_hot"]
 FORMATS: tuple[str, ...] = get_args(ObservationFormat)
 
 
-class Shown:
+class ShownObservations:
     """The observations of an environment, in one of the formats.
 
     The index of a state consists of several parts, see `shape` of `taichi_ants.task.Observation`:
@@ -84,7 +84,7 @@ def tabulate(
     Returns:
         Action values, float32 (n_states, 5). For actions, 1 for the action and 0 for all others.
     """
-    seen = Shown(observations.get(observation), observation_format).table
+    seen = ShownObservations(observations.get(observation), observation_format).table
     n_states, given = len(seen), np.asarray(function(seen))
     what = "the array that the function returned"
     if given.ndim == 1:

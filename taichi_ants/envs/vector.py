@@ -16,7 +16,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from taichi_ants.arguments import check_ranges, checked_max_steps, checked_task, checked_world
-from taichi_ants.envs.formats import ObservationFormat, Shown
+from taichi_ants.envs.formats import ObservationFormat, ShownObservations
 from taichi_ants.errors import AntsError, as_array, check_one_of, shown
 from taichi_ants.task import Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, N_STATES, PICK_UP
@@ -88,7 +88,7 @@ class Ants(ABC):
         if self.render_mode is not None:
             check_one_of("render_mode", self.render_mode, METADATA["render_modes"])
         self.max_steps = checked_max_steps(arguments.max_steps, task)
-        self.shown = Shown(task.sees, arguments.observation_format)
+        self.shown = ShownObservations(task.sees, arguments.observation_format)
         self._scene: Any = None  # of `draw`
 
     @abstractmethod

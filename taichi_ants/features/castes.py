@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from taichi_ants.errors import AntsError, count
-from taichi_ants.features.feature import ANT, CASTE, Array, Feature, State, Task
+from taichi_ants.features.feature import ANT, Array, Feature, State, Task
 from taichi_ants.features.labour import Threshold
 from taichi_ants.features.life import Ticks
-from taichi_ants.grid.constants import MAX_CASTES, MAX_NESTS, TRAIL
+from taichi_ants.grid.constants import MAX_CASTES, MAX_NESTS
 from taichi_ants.settings import Setting, Settings
 
 if TYPE_CHECKING:
     import numpy as np
 
+CASTE = "caste"  # an entry for each caste
 ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
 Rate = Annotated[float | None, Setting(least=0, most=1)]
 Number = Annotated[int | None, Setting(least=0)]
@@ -253,25 +254,45 @@ def _newborn(state: State, w: int, nests: np.ndarray, draw: Callable[[int], np.n
     return {"caste": np.count_nonzero(bounds <= drawn[:, None], axis=1)}
 
 
+def _policies(task: Task) -> dict[int, tuple[str, str]]:
+    """Return the policies of castes by number, and their names in messages."""
+    return {
+        number: (caste.policy, f"`task.castes.{name}.policy`")
+        for number, (name, caste) in enumerate(task.castes.items())
+        if caste.policy is not None
+    }
+
+
+def _without_policies(task: Task) -> Task:
+    """Return the task with policies that are not files."""
+    follow = [name for name, caste in task.castes.items() if caste.policy is not None]
+    return task.replace(castes={name: {"policy": "random"} for name in follow})
+
+
+def _counts(state: State) -> dict[str, np.ndarray]:
+    """Return the deliveries by caste, (W, castes); one column for all ants without castes."""
+    by_caste = state.caste_deliveries if state.task.castes else state.deliveries[:, None]
+    return {"caste_deliveries": by_caste}
+
+
 def _lays(task: Task, caste: Caste) -> int:
     """Return a bit for each pheromone that the ants of a caste lay."""
-    names = (TRAIL, *task.fields)
+    names = list(task.pheromones)
     return sum(1 << names.index(name) for name in set(caste.pheromones_laid(names)))
 
 
-def _own(name: str, of_choice: bool = False) -> Callable[[Task, Caste], float]:
-    """Return a function of the number of a caste: that of the colony is -1, or that of choices."""
-
-    def of(task: Task, caste: Caste) -> float:
-        default = (getattr(task.choice, name) or 0.0) if of_choice else -1.0
-        return default if getattr(caste, name) is None else getattr(caste, name)
-
-    return of
+def _own(name: str) -> Callable[[Task, Caste], float]:
+    """Return a function of the number of a caste; that of the colony is -1."""
+    return lambda task, caste: -1.0 if getattr(caste, name) is None else getattr(caste, name)
 
 
 CASTES = Feature(
     Caste,
     uses=lambda task: bool(task.castes),
+    spaces={CASTE: lambda state: len(state.task.castes)},
+    tables_by=CASTE,
+    policies=_policies,
+    without_files=_without_policies,
     arrays=(
         Array("caste", ANT, "i1", "castes", "i4"),
         Array("caste_deliveries", CASTE, "i4", "caste_deliveries", "i4", unit="items"),
@@ -280,7 +301,6 @@ CASTES = Feature(
         "epsilon": _own("epsilon"),
         "epsilon_spread": lambda task, caste: caste.epsilon_spread or 0.0,
         **{name: _own(name) for name in ("learning_rate", "discount")},
-        **{name: _own(name, of_choice=True) for name in ("temperature", "k", "exponent")},
         "learns": lambda task, caste: caste.policy is None,
         "lays": _lays,
         "cues": lambda task, caste: task.all_cues.index(task.cues_of(caste)),
@@ -291,6 +311,7 @@ CASTES = Feature(
     ),
     columns=_columns,
     constants=_constants,
+    counts=_counts,
     refusals=_refusals,
     newborn=_newborn,
 )

@@ -21,7 +21,7 @@ from taichi_ants.settings import Settings
 if TYPE_CHECKING:
     import numpy as np
 
-ANT, NEST, CASTE = "ant", "nest", "caste"
+ANT, NEST, CELL = "ant", "nest", "cell"
 # Of `taichi_ants.task`, which imports the features.
 Task = Any
 Caste = Any
@@ -30,11 +30,11 @@ _default: Any = cache(lambda settings: settings())  # of a group; they cost more
 
 
 class Array(NamedTuple):
-    """An array of a colony by ant, or by world and nest or caste.
+    """An array of a colony by ant, or by world and nest, cell, or what a feature counts.
 
     Attributes:
         name: Its name in hooks; that of the array in kernels, and in files.
-        per: ANT, NEST or CASTE.
+        per: ANT, NEST, CELL, or one of `Feature.spaces`.
         dtype: The type in kernels; "i1", "i4" or "f4" per ant.
         view: Its name as an attribute of a colony; of a feature, also that of a snapshot, with
             "ant_" in front. "" if it has none.
@@ -43,6 +43,7 @@ class Array(NamedTuple):
             leaves out arrays without a name.
         start: The value at the start of an episode, and where no ant is.
         instead: The array that the attribute shows if a colony does not need this one; "" for 0.
+        always: Whether kernels have the array, with one entry, if the model does not need it.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Array(NamedTuple):
     unit: str = ""
     start: int = 0
     instead: str = ""
+    always: bool = False
 
 
 class Mark(NamedTuple):
@@ -101,6 +103,7 @@ class Feature:
             default all settings of the group.
         uses: A function of a task that says whether it uses the feature, instead of the switch.
         runs_alone: Whether lone ants have the feature, too.
+        spaces: What it counts, with functions of a colony that return its number in a world.
         arrays: The arrays that it adds to the state of a colony.
         numbers: Settings that hooks read as `a.task.GROUP.SETTING`, f64.
         probabilities: Settings that hooks read as `a.SETTING_below`: a bound of random words, u64.
@@ -109,8 +112,20 @@ class Feature:
         fixed: A function of a caste whose result cannot change in an episode.
         columns: A function of a colony that returns the arrays (W, ants) of ants that start, where
             these are not 0.
+        filled: A function of a colony and of kinds of food (...,), which returns the arrays of
+            cells that are filled with this food.
+        tables_by: The name of an array of ants, and of what it numbers: ants of a nest with equal
+            numbers share a table of action values.
+        policies: A function of a task that returns the policies that ants with a number in
+            `tables_by` follow, by this number, and their names in messages.
+        without_files: A function of a task that returns one without files as policies.
         constants: A function of a colony that returns further arrays of its kernels.
         refusals: A function of a colony that yields why it cannot be, as sentences.
+        counts: A function of a colony that returns further results of the episode so far (W, ...),
+            by their names in `ColonyEpisodes`; also if no task uses the feature.
+        paid: A function of a colony and of rewards by event (W, capacity), which returns rewards.
+        shown: A function of a colony, the number of a world, the slots of its ants, and of whether
+            cells have food, which returns fields of a `Snapshot`.
         newborn: A function of a colony, a world, the nests (n,) of ants that an intervention adds,
             and a function that draws n words. It returns their arrays (n,) where these are not 0.
         faults: A function of a task that yields what is wrong with it, as sentences.
@@ -125,14 +140,22 @@ class Feature:
     switch: str = ""
     uses: Callable[[Task], bool] | None = None
     runs_alone: bool = False
+    spaces: Mapping[str, Callable[[State], int]] = field(default_factory=dict)
     arrays: tuple[Array, ...] = ()
     numbers: tuple[str, ...] = ()
     probabilities: tuple[str, ...] = ()
     of_castes: Mapping[str, Callable[[Task, Caste], float]] = field(default_factory=dict)
     fixed: Callable[[Caste], Any] = lambda caste: None
     columns: Callable[[State], Mapping[str, Any]] = lambda state: {}
+    filled: Callable[..., Mapping[str, Any]] = lambda state, kinds: {}
+    tables_by: str = ""
+    policies: Callable[[Task], Mapping[int, tuple[str, str]]] = lambda task: {}
+    without_files: Callable[[Task], Task] = lambda task: task
     constants: Callable[[State], Mapping[str, Any]] = lambda state: {}
     refusals: Callable[[State], Iterator[str]] = lambda state: iter(())
+    counts: Callable[[State], Mapping[str, Any]] = lambda state: {}
+    paid: Callable[[State, np.ndarray], np.ndarray] = lambda state, rewards: rewards
+    shown: Callable[..., Mapping[str, Any]] = lambda state, w, slots, is_food: {}
     newborn: Callable[..., Mapping[str, Any]] = lambda state, w, nests, draw: {}
     faults: Callable[[Task], Iterator[str]] = lambda task: iter(())
     example: Mapping[str, Any] = field(default_factory=dict)

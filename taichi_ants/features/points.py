@@ -1,9 +1,10 @@
 """The points of a tick at which hooks of features run, in the order of a tick.
 
-A point has the names of the arguments of its hooks. An argument `a` is an ant and `nest` a nest:
-hooks read and write their values by name, for example `a.idle`. The name of an array or of a number
-means that of the ant's nest or caste if there is one for each nest or caste. All hooks of a point
-run in the order of `FEATURES`.
+A point has the names of the arguments of its hooks. An argument `a` is an ant, `nest` a nest and
+`cell` a cell: hooks read and write their values by name, for example `a.idle`. The name of an array
+or of a number means that of the ant's nest or caste if there is one for each nest or caste. An
+array of a feature that the model does not use reads as its start. All hooks of a point run in the
+order of `FEATURES`.
 """
 
 POINTS = {
@@ -19,6 +20,12 @@ POINTS = {
     # The hook returns 1 if the ant rests, else 0, in the tick after `choose`. One hook is enough:
     # the ant then has no event and no reward, lays nothing and does not learn.
     "rests": "a",
+    # An ant has taken one load of food from a cell. The hook returns how many are left, by the hook
+    # before, at first 0; without a load, the cell is empty.
+    "took": "a cell left",
+    # An ant needs the reward for the event of its last action. The hook returns that of the hook
+    # before, at first by `task.rewards`, or another one.
+    "pays": "a event reward",
     # A nest has received n food items in this tick.
     "delivered": "nest n",
     # An ant has delivered its food in this tick.
@@ -26,6 +33,14 @@ POINTS = {
     # Ants have acted, and newborn ants have their places. The hook returns whether the ant dies;
     # one of the hooks is enough. A dying ant still learns in this tick.
     "aged": "a",
+    # An ant that dies has left one load of food in its cell.
+    "dropped": "a cell",
+    # Food of a kind can grow back in a cell. The hook returns after how many ticks, by the hook
+    # before, at first `task.life.regrowth`; never, if negative.
+    "waits": "cell kind ticks",
+    # Food of a kind has grown back in a cell. The hook returns the number of loads, by the hook
+    # before, at first 1.
+    "filled": "cell kind n",
     # All ants have acted, and this one, which does not rest, is about to observe. The hook returns
     # whether the ant stops after it has learned; one of the hooks is enough.
     "acted": "a",

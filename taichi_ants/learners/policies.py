@@ -59,12 +59,10 @@ def action_probabilities(
     differ from those in kernels by rounding.
     """
     explores = np.floor(epsilon * 2.0**32) / 2.0**32
-    largest = q_values.max(axis=-1, keepdims=True)
-    if choice is not None and choice.rule == "softmax":
-        weights = np.exp((q_values.astype(float) - largest) / choice.temperature)
+    if choice is not None and (weights := choice.weights(q_values)) is not None:
         shares = weights / weights.sum(axis=-1, keepdims=True)
         return explores / N_ACTIONS + (1.0 - explores) * shares
-    best = q_values >= largest
+    best = q_values >= q_values.max(axis=-1, keepdims=True)
     return explores / N_ACTIONS + best * ((1.0 - explores) / best.sum(axis=-1, keepdims=True))
 
 

@@ -18,11 +18,11 @@ from taichi_ants import learners, worlds
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect
 from taichi_ants.features import FEATURES
+from taichi_ants.features.rule import Parameters
 from taichi_ants.features.support import refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
 from taichi_ants.live.setup import FORM_SUPPORTS, MOST_ANTS, MOST_TEXT, Setup
-from taichi_ants.rules.rule import Parameters
 from taichi_ants.settings import MISSING, DeclaredSetting, Named, all_of, declared, flat, nested
 from taichi_ants.task import Task, observations
 
@@ -229,7 +229,7 @@ def sliders(interventions: Interventions) -> dict[str, Value]:
     colony, pheromone = interventions.colony, interventions.colony.pheromones[0]
     living, rules = int(np.count_nonzero(colony.living[0])), "task.pheromone"
     values = {"ants": Value(max(living, 1), 1, colony.capacity, 1, "ants")}
-    if colony.task.choice.needs_table:
+    if colony.task.needs_table:
         values["epsilon"] = Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon")
     if colony.sharing != "frozen":
         values["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001, "learning_rate")

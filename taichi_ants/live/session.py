@@ -322,7 +322,7 @@ class Session:
         """Return the bytes of a policy file; raise AntsError if ants have several tables."""
         colony, learns = self.colony, self.setup.learns
         tables = colony.q_values[0].reshape(-1, colony.task.n_states, N_ACTIONS)
-        no_table = not colony.task.choice.needs_table
+        no_table = not colony.task.needs_table
         if no_table or (len(tables) > 1 and learns):
             raise AntsError(
                 f"ants have {'no table' if no_table else 'several tables'}, but a policy file "

@@ -106,7 +106,7 @@ class Setup:
         """Return the colony before its first episode; raise AntsError if it cannot be built."""
         options: dict[str, Any] = {"ants": self.ants, "capacity": self.capacity}
         training: TrainingConfig | None = None
-        if not self.task.choice.needs_table:
+        if not self.task.needs_table:
             options["sharing"] = "frozen"
         elif isinstance(self.policy, TrainingConfig):
             training, options["sharing"] = self.policy, self.sharing

@@ -39,7 +39,7 @@ class Series(Record):
         return f"Series({len(self)} rows of {', '.join(self.values)})"
 
 
-class Recorder:
+class SeriesRecorder:
     """A recorder that reads measures of a colony at fixed ticks of each episode.
 
     Args:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.choice import facts_of
-from taichi_ants.reference.features import inputs_of
+from taichi_ants.reference.features import hooks, inputs_of
 from taichi_ants.reference.features.castes import lays
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick
-from taichi_ants.reference.world_state import WorldState, computed
-from taichi_ants.rules import Rule
-from taichi_ants.task import Task, Traffic
+from taichi_ants.reference.world_state import WorldState
+from taichi_ants.task import Traffic
 from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, SEES_CUE, SEES_EMPTY, SEES_GOAL, Event
 
 # The field of `Rewards` for each event.
@@ -135,13 +134,14 @@ def resolve_moves(
     return entered, pushed
 
 
-def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Task) -> None:
+def carry_out(colony: Any, intents: Sequence[Intent], tick: int) -> None:
     """Let all ants act at once, and record in each its action, its event and its reward.
 
     All intents are from the start of the tick, so no ant's action changes that of another ant. At
     most one ant enters a given cell, at most one takes its food, and at most one deposits on it in
     a pheromone. Ants lay one pheromone after the other, the trail first.
     """
+    world, task = colony.world, colony.task
     winning = winners(intents, tick, world.index, task.traffic.carriers_first)
     entered, pushed = resolve_moves(intents, winning, task.traffic)
     acted: list[tuple[Intent, Cell, bool]] = []
@@ -160,13 +160,13 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
             ant.cell = entered[slot]
             event = Event.ENTERED_CUE if intent.shows_cue else Event.ENTERED_EMPTY
         else:
-            event = _handle(world, intent, slot in winning, task)
+            event = _handle(colony, intent, slot in winning)
         if intent.rests:
             ant.event, ant.reward = Event.NONE, 0
             continue
         paid = getattr(task.rewards, PAID[event])
-        if world.foods and event in (Event.PICKED_UP, Event.DELIVERED):
-            paid = getattr(world.foods[ant.kind], PAID[event])
+        for pays in hooks(task, "pays"):
+            paid = pays(colony, ant, event, paid)
         ant.event, ant.reward = event, paid
         acted.append((intent, start, had_food))
     for name, trail in world.pheromones.items():
@@ -205,31 +205,21 @@ def _marked(laid: str, intent: Intent, start: Cell, had_food: bool) -> list[Cell
     return [ant.cell] if ant.cell != start else []
 
 
-def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
+def _handle(colony: Any, intent: Intent, wins: bool) -> Event:
     """Do a pick-up or a delivery if it is possible, and return the event."""
     ant = intent.ant
     if intent.gives:
         ant.carries, ant.carried = False, 0
-        if task.turns_at_queen:
+        if colony.task.turns_at_queen:
             ant.heading = (ant.heading + 3) % N_HEADINGS
         return Event.DELIVERED
     if intent.action == PICK_UP and wins and intent.target is not None:
-        ant.kind = world.kinds[intent.target]
-        world.loads[intent.target] -= 1
-        if world.loads[intent.target] == 0:
-            world.ground[intent.target] = EMPTY
+        left = 0
+        for took in hooks(colony.task, "took"):
+            left = took(colony, ant, intent.target, left)
+        if left == 0:
+            colony.world.ground[intent.target] = EMPTY
         ant.carries, ant.carried = True, 0
         ant.heading = (ant.heading + 3) % N_HEADINGS
         return Event.PICKED_UP
     return Event.FAILED
-
-
-def pay(world: WorldState, was: Ant, ant: Ant, rule: Rule, task: Task, tick: int) -> int:
-    """Return the reward of an ant by your rule, after the tick; `was` is the ant before it."""
-    inputs = {"paper_state": was.paper_state, "next_paper_state": ant.paper_state}
-    inputs |= {
-        "reward": ant.reward,
-        "event": ant.event,
-        **facts_of(world, ant, task, tick, ()),
-    }
-    return int(computed(rule, task.rules, inputs))

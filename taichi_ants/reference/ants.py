@@ -36,7 +36,6 @@ class Ant:
     reward: int = 0  # of the last action
     chosen: int | None = None  # the action already drawn for the next tick
     nest: int = 0
-    kind: int = 0  # of the last food that it picked up
     caste: int = 0
     trait: float = 0.0  # from 0 to less than 1; never changes
     own: dict[str, Any] = field(default_factory=dict)  # values of features of the model by name

@@ -13,18 +13,19 @@ from taichi_ants.features.support import COLONY, refuse_unsupported
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_BORN, STREAM_QUEEN
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import frozen_policy
-from taichi_ants.reference.actions import Intent, carry_out, intend, pay
+from taichi_ants.reference.actions import Intent, carry_out, intend
 from taichi_ants.reference.ants import Ant, Transition, nest_of, starts
-from taichi_ants.reference.choice import choose_action, choose_by_rule, choose_cell
 from taichi_ants.reference.features import castes, hooks
+from taichi_ants.reference.features.choice import choose
 from taichi_ants.reference.food_sources import FoodSources
-from taichi_ants.reference.geometry import Cell, neighbour, queens_of
+from taichi_ants.reference.geometry import Cell, kinds_of_food, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS, learn_together
 from taichi_ants.reference.observations import OBSERVATIONS, codes_in_view, observe, yours
+from taichi_ants.reference.own_rules import choose_by_rule, pay
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task
-from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP, Event
+from taichi_ants.task.constants import EMPTY, FOOD, GIVE, PICK_UP, Event
 from taichi_ants.worlds.world import World
 
 
@@ -110,6 +111,8 @@ class ReferenceColony:
     def _set_up(self) -> None:
         """Reset everything that lasts for one episode."""
         self.world = WorldState(self.start_world, self.task, self.learns)
+        for cell, kind in kinds_of_food(self.start_world).items():
+            self.fill(cell, kind)
         self.food_sources = FoodSources(self.start_world)
         self.stores = [0] * len(self.world.queens)  # food that each queen will turn into ants
         self.next_number = self.n_ants  # of the next ant that is added
@@ -130,6 +133,13 @@ class ReferenceColony:
             self.add(Ant(cell, heading, False, number, number, stream, nest=nest, caste=caste))
         for ant in self.ants.values():
             self.observe(ant)
+
+    def fill(self, cell: Cell, kind: int) -> int:
+        """Fill a cell with food of a kind; return the number of loads."""
+        self.world.ground[cell], n = FOOD, 1
+        for filled in hooks(self.task, "filled"):
+            n = filled(self, cell, kind, n)
+        return n
 
     def add(self, ant: Ant) -> None:
         """Put an ant into its slot and onto its cell."""
@@ -197,7 +207,7 @@ class ReferenceColony:
             for execute in hooks(self.task, "execute"):
                 action = execute(self, ant, action)
             intents.append(intend(self.world, ant, action, self.task.traffic))
-        carry_out(self.world, intents, tick, self.task)
+        carry_out(self, intents, tick)
         for intent in intents:
             picked = intent.target if intent.ant.event is Event.PICKED_UP else None
             if picked is not None and self.world.ground[picked] == EMPTY:  # its last load
@@ -209,8 +219,7 @@ class ReferenceColony:
             self._births(nest)
         dying = self._deaths(acting)
         life = self.task.life
-        delays = [food.regrowth for food in self.task.foods.values()] or [life.regrowth]
-        self.record.regrown += self.food_sources.regrow(self.world, delays, tick)
+        self.record.regrown += self.food_sources.regrow(self, tick)
         if life.pile_move_interval is not None and (tick + 1) % life.pile_move_interval == 0:
             self.food_sources.move_piles(self.world, self.queen_stream)
         pairs = zip(before, acting, intents, strict=True)
@@ -243,17 +252,12 @@ class ReferenceColony:
         return any(results)
 
     def _draw_action(self, ant: Ant, tick: int) -> int:
-        caste, choice = self.castes[ant.caste], self.task.choice
-        for name in ("temperature", "k", "exponent"):
-            if (number := getattr(caste, name)) is not None:
-                choice = replace(choice, **{name: number})
-        if choice.rule == "deneubourg":
-            return choose_cell(self.world, ant, choice, self.task.traffic)
+        choice = self.task.choice
         values = self.learners[self.table_of(ant)].rows[ant.state] if choice.needs_table else []
-        epsilon = castes.epsilon_of(caste, ant, self.epsilon)
+        epsilon = castes.epsilon_of(self.castes[ant.caste], ant, self.epsilon)
         if choice.own_rule is not None:
             return choose_by_rule(self.world, ant, self.task, values, epsilon, tick)
-        return choose_action(values, epsilon, ant.stream, choice)
+        return choose(self.world, ant, self.task, values, epsilon)
 
     def _count(self, before: Sequence[Ant], acting: Sequence[Ant]) -> None:
         """Record what happened in the tick, and store and use what each nest got."""
@@ -267,7 +271,7 @@ class ReferenceColony:
             if ant.event is Event.DELIVERED:
                 record.deliveries += 1
                 record.carried += was.carried
-                record.delivered[ant.nest, ant.kind] += 1
+                record.delivered[ant.nest, ant.own["kind"]] += 1
                 record.by_caste[ant.caste] += 1
                 fed[ant.nest] += 1
                 for gave in hooks(task, "gave"):
@@ -314,7 +318,9 @@ class ReferenceColony:
         for ant in dying:
             del self.world.ants[ant.cell]
             if ant.carries:
-                self.world.put_food(ant.cell, ant.kind, 1)
+                self.world.ground[ant.cell] = FOOD
+                for dropped in hooks(self.task, "dropped"):
+                    dropped(self, ant, ant.cell)
             del self.ants[ant.slot]
         self.record.deaths += len(dying)
         return dying

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
+from taichi_ants.reference.features import hooks
 from taichi_ants.reference.geometry import Cell, kinds_of_food, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds.world import World
 
 
@@ -70,20 +71,20 @@ class FoodSources:
             if source.cell == cell and source.waiting_since is None:
                 source.waiting_since = tick
 
-    def regrow(self, world: WorldState, delays: Sequence[int | None], tick: int) -> int:
+    def regrow(self, colony: Any, tick: int) -> int:
         """Let food grow back where food sources have waited long enough, and their cell is empty.
 
-        `delays` are ticks, by kind of food; None means that the kind does not grow back. Returns
-        the number of loads that grew back.
+        Returns the number of loads that grew back.
         """
         regrown = 0
         for source in self.food_sources:
-            since, delay = source.waiting_since, delays[source.kind]
-            waits = since is not None and delay is not None and tick >= since + delay
-            if waits and world.content(source.cell) == EMPTY:
-                world.put_food(source.cell, source.kind, world.full(source.kind))
+            since, delay = source.waiting_since, colony.task.life.regrowth
+            for waits in hooks(colony.task, "waits"):
+                delay = waits(colony, source.cell, source.kind, delay)
+            is_over = since is not None and delay is not None and tick >= since + delay
+            if is_over and colony.world.content(source.cell) == EMPTY:
+                regrown += colony.fill(source.cell, source.kind)
                 source.waiting_since = None
-                regrown += world.full(source.kind)
         return regrown
 
     def move_piles(self, world: WorldState, stream: RandomStream) -> None:
@@ -102,8 +103,8 @@ class FoodSources:
                     if world.ground.get(ahead, OBSTACLE) not in (OBSTACLE, QUEEN):
                         source.cell = ahead
                 elif world.content(ahead) == EMPTY:
-                    world.ground[source.cell] = EMPTY
-                    world.put_food(ahead, source.kind, 1)
+                    world.ground[source.cell], world.ground[ahead] = EMPTY, FOOD
+                    world.of_cells[ahead] = world.of_cells.pop(source.cell)
                     source.cell = ahead
 
 

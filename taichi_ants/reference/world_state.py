@@ -12,14 +12,7 @@ import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.geometry import (
-    Cell,
-    existing_cells,
-    kinds_of_food,
-    listed_cells,
-    neighbour,
-    queens_of,
-)
+from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, neighbour, queens_of
 from taichi_ants.rules import Parameters, Rule
 from taichi_ants.rules.inputs import Vector
 from taichi_ants.task import Caste, Pheromone, Task
@@ -124,8 +117,9 @@ class WorldState:
     def __init__(self, world: World, task: Task, learns: bool = False) -> None:
         self._ranges = world.ranges
         self.queens: list[Cell] = queens_of(world)
-        # The values of the features of the model by name, for each nest.
+        # The values of the features of the model by name, for each nest and cell.
         self.of_nests: list[dict[str, Any]] = [defaultdict(float) for _ in self.queens]
+        self.of_cells: dict[Cell, dict[str, Any]] = defaultdict(dict)
         self.ants: dict[Cell, Ant] = {}
         # The content of each cell: EMPTY (also under ants), OBSTACLE, FOOD or QUEEN.
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(world.ranges), EMPTY)
@@ -135,12 +129,9 @@ class WorldState:
         levels = {(x, y, z): level for x, y, z, level in world.trails.tolist()}
         self.pheromones = {"trail": Trail([*self.ground], task.pheromone, levels)}
         self.take(task, learns)
-        self.kinds = kinds_of_food(world)
-        self.loads = {cell: self.full(kind) for cell, kind in self.kinds.items()}
 
     def take(self, task: Task, learns: bool) -> None:
         """Take the numbers of a task, and present rocks; pheromones keep their levels."""
-        self.foods = list(task.foods.values())  # none for the usual food
         self.cues = [  # the outbound and the homing cue of each caste
             (caste.outbound_cue or task.outbound_cue, caste.homing_cue or task.homing_cue)
             for caste in task.castes.values() or [Caste()]
@@ -167,14 +158,6 @@ class WorldState:
         outbound, homing = self.cues[ant.caste]
         uses_homing = ant.carries and homing in self.pheromones
         return self.pheromones[homing if uses_homing else outbound]
-
-    def full(self, kind: int) -> int:
-        """Return the number of loads in a full cell of a kind of food."""
-        return self.foods[kind].loads if self.foods else 1
-
-    def put_food(self, cell: Cell, kind: int, loads: int) -> None:
-        """Put food on a cell."""
-        self.ground[cell], self.kinds[cell], self.loads[cell] = FOOD, kind, loads
 
     def content(self, cell: Cell) -> int:
         """Return the content of a cell: its ground, or OBSTACLE for an ant or the outside."""

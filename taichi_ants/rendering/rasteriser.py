@@ -10,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from taichi_ants import runtime
+from taichi_ants.features.fields import TRAIL
+from taichi_ants.features.pheromone import DEPOSIT_LEVEL
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.records import Snapshot
 from taichi_ants.rendering import colours
 from taichi_ants.rendering.colours import Mark
-from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
-from taichi_ants.task.field import TRAIL
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 # Sizes of hexagons are in pixels, from the centre to a corner.
 # At this size and above, food and queen are drawings on a light background. In smaller cells, food

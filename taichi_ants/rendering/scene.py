@@ -9,6 +9,7 @@ import numpy as np
 
 from taichi_ants.errors import AntsError, as_array, expect
 from taichi_ants.features.cues import COMPASS, CUES
+from taichi_ants.features.fields import TRAIL
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.records import Snapshot
@@ -17,7 +18,6 @@ from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks
 from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, FOOD, N_ACTIONS, QUEEN
-from taichi_ants.task.field import TRAIL
 from taichi_ants.task.states import TASK_NAMES
 
 _PAPER = observations.get("paper")
@@ -120,7 +120,7 @@ class Scene:
         expect("grid", grid, AxialGrid)
         expect("task", task, Task, type(None))
         self._task, self._title, self._overlay = task, title, overlay
-        fields = {} if task is None else {TRAIL: task.pheromone, **task.fields}
+        fields = {} if task is None else task.pheromones
         regular = ("none", "set", "fading")  # other deposits, and diffusion, have no usual levels
         scales = {
             name: rule.darkest if rule.deposit in regular and not rule.diffusion else None

@@ -17,6 +17,7 @@ from taichi_ants import files, learners, rules
 from taichi_ants.analysis.tables import Table
 from taichi_ants.errors import AntsError
 from taichi_ants.features import FEATURES
+from taichi_ants.features.choice import WITHOUT_VALUES
 from taichi_ants.features.feature import Feature
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
@@ -109,7 +110,7 @@ class Model:
         if own == "distribution" and row["task.labour.rule"] == "none":
             return False
         if name == "evaluation_epsilon":
-            return row["task.choice.rule"] != "deneubourg"
+            return row["task.choice.rule"] not in WITHOUT_VALUES
         if setting is None or setting.rule.only is None:
             return True
         other, *needed = setting.rule.only
@@ -269,7 +270,6 @@ class Model:
                 ("cell", f"level of `{field}`", number, "level"): True
                 for field in ("trail", *self.entries("fields"))
             },
-            ("cell", "food", number, "loads"): self.entries("foods"),
             ("nest", "food received", number, "items"): True,
             ("ant", "cell", "", ""): True,
             ("ant", "heading", "0 to 5, clockwise; 0 is up", "60 degrees"): True,

@@ -74,7 +74,7 @@ class Picture(NamedTuple):
         return base64.b64encode(png(self.image, optimize=True)).decode()
 
 
-class Shown(NamedTuple):
+class ShownFinding(NamedTuple):
     """A finding in one setting, with the label and the unit of its effect."""
 
     setting: str
@@ -113,7 +113,7 @@ class Statement(NamedTuple):
     place: str
     verdicts: Sequence[Verdict]
     facts: Mapping[str, str]
-    shown: Sequence[Shown]
+    shown: Sequence[ShownFinding]
 
 
 # In the order of the tallies on the page.

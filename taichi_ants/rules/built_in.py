@@ -1,4 +1,4 @@
-"""The built-in rules of each kind: words that the engine implements, and functions.
+"""The built-in rules that are functions; others are words, see `WORDS` in `features/rule.py`.
 
 Functions have the form of the rules that you write, see `taichi_ants.rules.register`. Kernels are
 made from them, and the reference calls them. Their docstrings describe models.
@@ -8,10 +8,4 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-WORDS = {
-    "choice": ("greedy", "softmax", "deneubourg"),
-    "deposit": ("set", "add", "fading", "none"),
-    "evaporation": ("linear", "exponential", "none"),
-    "reward": ("by_event",),
-}
 FUNCTIONS: dict[str, tuple[Callable[..., float], ...]] = {}  # by kind

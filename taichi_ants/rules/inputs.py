@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from taichi_ants.features import INPUTS
 from taichi_ants.features.feature import Input
+from taichi_ants.features.rule import RuleKind
 from taichi_ants.grid.constants import MOST_REWARD
 
 if TYPE_CHECKING:
@@ -15,17 +16,6 @@ if TYPE_CHECKING:
 AHEAD = 3  # entries of an input with a value for each cell ahead: left, forward, right
 LEVELS, LEVEL = "levels_", "level_"  # the beginnings of inputs that read a field
 MOST_LEVEL = 1_000_000_000
-
-
-class RuleKind(NamedTuple):
-    """A kind of rule: its result and the range of its result, and its inputs by name."""
-
-    result: str
-    least: float
-    most: float
-    is_whole: bool
-    inputs: Mapping[str, Input]
-    of_fields: tuple[str, ...] = ()  # the beginnings of inputs that read a field
 
 
 _CUE = "the ant's cue: the pheromone that an ant with its load follows"

@@ -1,97 +1,25 @@
-"""Rules that are functions: parameters, registration, and trial on drawn inputs."""
+"""The registration of rules that are functions, and their trial on drawn inputs."""
 
 from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, make_dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import field, make_dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 from taichi_ants.errors import AntsError, check_one_of, shown, unusable
-from taichi_ants.registry import Registry
-from taichi_ants.rules.built_in import FUNCTIONS, WORDS
-from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, input_of, values_shown
+from taichi_ants.features.feature import Input
+from taichi_ants.features.rule import RULES, Parameters, Rule
+from taichi_ants.rules.built_in import FUNCTIONS
+from taichi_ants.rules.inputs import KINDS, drawn, field_of, input_of, values_shown
 from taichi_ants.rules.language import LanguageError, kernel_source
-from taichi_ants.settings import Setting, Settings, declared
+from taichi_ants.settings import Setting, declared
 
 if TYPE_CHECKING:
     import numpy as np
 
 TRIES = 2000  # drawn sets of inputs with which `register` tries a rule
-
-
-@dataclass(frozen=True)
-class Parameters(Settings, path="task.rules.NAME"):
-    """The parameters of a rule; each rule has its own subclass."""
-
-    @classmethod
-    def entry_named(cls, name: str) -> type[Parameters]:
-        """Return the class of the parameters of a rule; AntsError if it is not registered."""
-        return RULES.get(name).settings
-
-    def __reduce__(self) -> Any:
-        # A pickle holds the name of the rule, because its class is made at registration.
-        return _parameters, (type(self).__name__, vars(self))
-
-
-@dataclass(frozen=True, eq=False)
-class Rule:
-    """A rule that you wrote, or a built-in one: a function of inputs, and of parameters.
-
-    Attributes:
-        name: The name that tasks use.
-        kind: "choice", "deposit", "evaporation" or "reward".
-        function: The function. Arguments without a default are inputs; `taichi_ants.rules.KINDS`
-            has the inputs of each kind. In "choice" and "reward", `levels_NAME` are the levels of
-            the field NAME in the three cells ahead, and `level_NAME` is that of the ant's own cell.
-            In "deposit", `level_NAME` is that of the cell of the deposit.
-            Arguments with a default are parameters, whole numbers or floats.
-        inputs: The inputs by name, in the order of the arguments.
-        settings: The class of the parameters.
-        source: The source of the function for kernels.
-    """
-
-    name: str
-    kind: str
-    function: Callable[..., Any]
-    inputs: Mapping[str, Input]
-    settings: type[Parameters]
-    source: str
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """The names of the parameters, in the order of the arguments."""
-        return tuple(setting.name for setting in declared(self.settings))
-
-    @property
-    def fields(self) -> tuple[str, ...]:
-        """The names of the fields that the rule reads."""
-        return tuple(dict.fromkeys(filter(None, map(field_of, self.inputs))))
-
-    def result(self, inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> float:
-        """Return the result of the Python function; it is limited to the range of the kind.
-
-        Actions and rewards are rounded down. A result that is not a number counts as the smallest.
-        """
-        numbers = {name: float(value) for name, value in parameters.items()}
-        kind, result = KINDS[self.kind], float(self.function(**inputs, **numbers))
-        result = min(max(result, kind.least), kind.most) if result == result else kind.least
-        return math.floor(result) if kind.is_whole else result
-
-
-# The built-in functions follow at the end of the file.
-RULES: Registry[Rule] = Registry(
-    *("rule", "taichi_ants.rules.register", {}),
-    reserved=[word for some in WORDS.values() for word in some],
-)
-
-
-get = RULES.get
-
-
-def _parameters(name: str, values: Mapping[str, Any]) -> Parameters:
-    return RULES.get(name).settings(**values)
 
 
 def register(
@@ -136,7 +64,8 @@ def _rule(name: str, kind: str, function: Callable[..., Any]) -> Rule:
     inputs, settings = _arguments(name, kind, function)
     arguments = inspect.signature(function).parameters
     lengths = {name: inputs[name].length if name in inputs else 0 for name in arguments}
-    rule = Rule(name, kind, function, inputs, settings, "")
+    fields = tuple(dict.fromkeys(filter(None, map(field_of, inputs))))
+    rule = Rule(name, kind, KINDS[kind], function, inputs, fields, settings)
     try:
         return replace(rule, source=kernel_source(function, lengths))
     except LanguageError as error:
@@ -210,21 +139,6 @@ def _try_in_python(rule: Rule) -> None:
         if fault:
             must = f"it must return {kind.result.split(':')[0]}, {form}"
             raise unusable(rule, f"{fault} for {values_shown(values)}, but {must}")
-
-
-def registered(kind: str, name: str) -> Rule | None:
-    """Return the rule of this name; None for the words that the engine implements."""
-    return None if name in WORDS[kind] else get(name)
-
-
-def names(kind: str | None = None) -> tuple[str, ...]:
-    """Return the names of rules, of one kind or of all: built-in functions, then yours."""
-    return tuple(name for name in RULES.names() if kind in (None, get(name).kind))
-
-
-def words(kind: str) -> tuple[str, ...]:
-    """Return all words that name a rule of a kind, those that the engine implements first."""
-    return (*WORDS[kind], *names(kind))
 
 
 RULES.built_in = {

@@ -1,4 +1,4 @@
-"""Designs: which points of ranges of settings a sweep runs, and the sensitivity indices they give.
+"""Designs: which points of ranges of settings a sweep runs.
 
 A setting of a sweep file has a list of values, or a range: `{ from = 10, to = 99, scale = "log" }`.
 A grid combines all values. A Sobol design draws points of the unit cube, whose shares become
@@ -15,21 +15,18 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from taichi_ants.analysis.statistics import RANDOM_SEED, all_equal, known_means
-from taichi_ants.analysis.tables import Table, number, plain_text
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.settings import Flag, Setting, Settings
 
 _DRAWN = ("design", "sobol")  # the condition of the other keys
-_NORMAL_95 = 1.959963984540054  # half of the width of an interval, in standard deviations
-COLUMNS = ("measure", "setting", "first_order", "first_order_low", "first_order_high",
-    "total", "total_low", "total_high")  # of the table of indices  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Range:
-    """A range of numbers with both ends; if `whole`, of int; equal factors are equally frequent
-    if `log`, else equal differences."""
+    """A range of numbers with both ends; `whole` has whole numbers only, as int.
+
+    With `log`, equal factors are equally frequent, otherwise equal differences.
+    """
 
     low: float
     high: float
@@ -69,16 +66,6 @@ def value_at(axis: Axis, share: float) -> Any:
         value = low * (1 - share) + high * share
     value = math.floor(value + 0.5) if axis.whole else value
     return min(max(value, axis.low), axis.high)
-
-
-def settings_in(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the settings in nested tables: full names, with a list of values or a range's table."""
-    for name, value in tree.items():
-        path = f"{before}.{name}" if before else name
-        if isinstance(value, Mapping) and value and not value.keys() & {"from", "to"}:
-            yield from settings_in(value, path)
-        else:
-            yield path, value if isinstance(value, (Mapping, list)) else [value]
 
 
 def varying(axes: Mapping[str, Axis]) -> dict[str, Axis]:
@@ -139,43 +126,3 @@ class Design(Settings):
         from_last = np.eye(dimensions + 2, dimensions, -1, dtype=bool)
         from_last[-1] = True
         return np.where(from_last, last, first).reshape(-1, dimensions)
-
-
-def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[dict[str, Any]]:
-    """Return the indices of settings as rows with `COLUMNS`, with 95 % intervals from a bootstrap.
-
-    The estimators are those of Saltelli et al. (2010). `values` of the measure are float64 (points,
-    seeds), for the points of Saltelli's scheme. Seeds without a value (nan) do not count. The list
-    is empty if a point has no value at all, or all means over seeds are equal.
-    """
-    means = known_means(values)
-    if np.isnan(means).any() or all_equal(means[None])[0]:
-        return []
-    first, *between, last = ((means - means.mean()) / means.std()).reshape(-1, len(names) + 2).T
-    draws = np.random.default_rng(RANDOM_SEED).integers(len(first), size=(len(first), 1000))
-    rows = []
-    for name, mixed in zip(names, between, strict=True):
-        found, resampled = (
-            _indices(first, mixed, last),
-            _indices(*(y[draws] for y in (first, mixed, last))),
-        )
-        ends = []
-        for index, of_resamples in zip(found, resampled, strict=True):
-            half = _NORMAL_95 * of_resamples.std(ddof=1)
-            ends += [float(each) for each in (index, index - half, index + half)]
-        rows.append(dict(zip(COLUMNS, (measure, name, *ends), strict=True)))
-    return rows
-
-
-def _indices(first: np.ndarray, mixed: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return first-order and total index of the setting that `mixed` has from `last`."""
-    variance = np.var(np.concatenate([first, last]), axis=0)
-    alone = np.mean(last * (mixed - first), axis=0) / variance
-    return alone, 0.5 * np.mean((first - mixed) ** 2, axis=0) / variance
-
-
-def report(rows: Sequence[Mapping[str, Any]], seeds: int) -> str:
-    """Return rows of indices as a table for a terminal."""
-    lines = [[n if isinstance(n, str) else number(n, 2) for n in row.values()] for row in rows]
-    notes = [f"Indices of means over {seeds} seeds, whose remaining change is in each total."]
-    return plain_text([Table("", COLUMNS, lines, notes, text_columns=2)], 200)

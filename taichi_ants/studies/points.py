@@ -20,7 +20,7 @@ from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.features.support import COLONY
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.measures.series import Recorder
+from taichi_ants.measures.series import SeriesRecorder
 from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
 from taichi_ants.settings import Setting, flat
 from taichi_ants.task import Task
@@ -236,7 +236,7 @@ class ColonyPoint:
                 )
         if self.evaluation_epsilon is not None:
             arguments.checked_share("evaluation_epsilon", self.evaluation_epsilon)
-        Recorder(self.measures, self.measure_every)  # raises an error if it cannot read them
+        SeriesRecorder(self.measures, self.measure_every)  # raises an error if it cannot read them
         checked_whole("ticks", self.ticks, most=MAX_STEPS)
         object.__setattr__(self, "protocol", checked_protocol(self.protocol))
         check_one_of("during", self.during, DURING)
@@ -283,7 +283,7 @@ class ColonyPoint:
     @property
     def seconds(self) -> float:
         """The approximate time of a seed on one processor."""
-        fields = [one for one in (self.task.pheromone, *self.task.fields.values()) if one.dense]
+        fields = [one for one in self.task.pheromones.values() if one.dense]
         work = sum(_WORK_OF_DIFFUSION if one.diffusion else _WORK_OF_A_CELL for one in fields)
         ants = self.ants + work * self.first_world.grid.size
         return ants * self.ticks * (self.episodes + self.rollouts) / _TICKS_OF_A_SECOND
@@ -307,7 +307,7 @@ class ColonyPoint:
             least = 0.0 if self.policy else self.training.least_epsilon
             epsilon = least if self.evaluation_epsilon is None else self.evaluation_epsilon
             training = TrainingConfig.frozen(epsilon)
-        if not self.task.choice.needs_table:
+        if not self.task.needs_table:
             training = None
         options |= {"ants": self.ants, "capacity": self.capacity, "start": self.start}
         options |= {"sharing": self.sharing if learns else "frozen", "q_values": q_values}

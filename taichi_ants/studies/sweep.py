@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.analysis import sweeps
+from taichi_ants.analysis import sensitivity, sweeps
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.statistics import known_means
 from taichi_ants.errors import AntsError, shown
@@ -21,7 +21,7 @@ from taichi_ants.measures.measure import RUN
 from taichi_ants.measures.series import stops
 from taichi_ants.settings import declared, flat
 from taichi_ants.studies import design
-from taichi_ants.studies.design import COLUMNS, Axis, Design
+from taichi_ants.studies.design import Axis, Design
 from taichi_ants.studies.folder import Results
 from taichi_ants.studies.points import SERIES
 from taichi_ants.studies.store import Arrays, parts_of
@@ -201,9 +201,9 @@ def tables(sweep: Sweep, results: Results) -> str:
     if sweep.design.sensitivity:
         ((_, axes),), seeds = sweep.grids, len(sweep.study.seeds)
         names = list(design.varying(axes))
-        indices = [row for name in values for row in design.indices(name, names, values[name])]
-        report = f"{report}\n{design.report(indices, seeds)}"
-        files.write_csv(folder / "sensitivity.csv", indices, COLUMNS)
+        indices = [row for name in values for row in sensitivity.indices(name, names, values[name])]
+        report = f"{report}\n{sensitivity.report(indices, seeds)}"
+        files.write_csv(folder / "sensitivity.csv", indices, sensitivity.COLUMNS)
     if results.figures:
         _draw(sweep, first, values[first], folder / "figures")
     return report

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ from taichi_ants.settings import (
     not_a_setting,
     settings_of_entry,
 )
-from taichi_ants.studies.design import Axis, Design, Range, settings_in
+from taichi_ants.studies.design import Axis, Design, Range
 from taichi_ants.studies.points import ColonyPoint, Drawn, FixedPolicy, Point, RunPoint
 from taichi_ants.task import Task
 
@@ -144,7 +144,7 @@ class Base(NamedTuple):
             if key not in built:
                 built[key] = FixedPolicy.named(tree["policy"], task)
             tree["policy"] = built[key]
-        if "policy" in tree or (self.kind == "colony" and not task.choice.needs_table):
+        if "policy" in tree or (self.kind == "colony" and not task.needs_table):
             training = TrainingConfig.frozen().as_dict()  # `check_training` refuses others
         key = repr(sorted(world.items()))
         if key not in built:
@@ -185,6 +185,16 @@ def as_list(value: Any) -> list:
     return value if isinstance(value, list) else [value]
 
 
+def settings_in(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the settings in nested tables: full names, with a list of values or a range's table."""
+    for name, value in tree.items():
+        path = f"{before}.{name}" if before else name
+        if isinstance(value, Mapping) and value and not value.keys() & {"from", "to"}:
+            yield from settings_in(value, path)
+        else:
+            yield path, value if isinstance(value, (Mapping, list)) else [value]
+
+
 def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:
     """Return the declaration of a setting; None if the task, training, world and events lack it.
 
@@ -213,7 +223,7 @@ def check_training(names: Iterable[str], points: Sequence[Point]) -> None:
     name = next((name for name in names if name.split(".")[0] == "training"), None)
     if name is None or any(point.episodes for point in points):
         return
-    explores = isinstance(points[0], ColonyPoint) and points[0].task.choice.needs_table
+    explores = isinstance(points[0], ColonyPoint) and points[0].task.needs_table
     more = ", or set evaluation_epsilon to let them explore" if explores else ""
     raise AntsError(
         f"{name} has no effect, because ants do not learn if episodes is 0; leave it out{more}."

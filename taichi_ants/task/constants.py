@@ -36,8 +36,6 @@ BEST_AT = N_ACTIONS
 # State = (carries, left, forward, right); index = 64 * carries + 16 * left + 4 * forward + right.
 N_STATES = 128
 
-# The trail level that a carrier sets.
-DEPOSIT_LEVEL = 250
 # A trail stores the tick at which it has evaporated, so a level plus a step must fit into 32 bits.
 MAX_TRAIL_LEVEL = 1_000_000_000
 

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 from taichi_ants.features import used_by
 from taichi_ants.features.cues import CUES
 from taichi_ants.task.constants import ROW
-from taichi_ants.task.field import TRAIL
 from taichi_ants.task.task import Task
 
 
@@ -61,7 +60,6 @@ class Model:
         # Whether actions can be executed differently, and cells seen differently.
         self.slips = any("execute" in feature.hooks for feature in self.features)
         self.misreads = any("see" in feature.hooks for feature in self.features)
-        self.has_foods, self.has_loads = bool(task.foods), task.has_loads
         self.n_nests, self.n_kinds = n_nests, max(1, len(task.foods))
         self.n_castes = len(task.castes)  # 0: ants have no castes
         # Whether the ants of a caste have different exploration rates.
@@ -112,7 +110,7 @@ class Model:
         self.deposit_rules = tuple(pheromone.own_deposit for pheromone in pheromones)
         self.evaporation_rules = tuple(pheromone.own_evaporation for pheromone in pheromones)
         # The names of all pheromones, if one of your rules can read them.
-        self.field_names = (TRAIL, *task.fields) if self.rules else ()
+        self.field_names = (*task.pheromones,) if self.rules else ()
         # Whether pheromones are laid one after the other, because rules of deposits read others.
         self.lays_in_turn = any(rule.kind == "deposit" and rule.fields for rule in self.rules)
         inputs = [read for rule in self.rules for read in rule.inputs.values()]

@@ -12,28 +12,21 @@ from typing import Annotated, Any, ClassVar, Literal
 from taichi_ants.errors import shown
 from taichi_ants.features import FEATURES, probabilities, used_by
 from taichi_ants.features.castes import ALL, NOTHING, Caste, parts_in
+from taichi_ants.features.choice import Choice
 from taichi_ants.features.cues import COMPASS, CUES
+from taichi_ants.features.fields import TRAIL, Field
 from taichi_ants.features.foods import Food
 from taichi_ants.features.labour import Labour
 from taichi_ants.features.life import Life
 from taichi_ants.features.noise import Noise
-from taichi_ants.rules.rule import Parameters, Rule, registered, words
-from taichi_ants.settings import Named, Setting, Settings, declared
+from taichi_ants.features.pheromone import Pheromone
+from taichi_ants.features.rule import Parameters, Rule, registered, words
+from taichi_ants.settings import Named, Setting, Settings
 from taichi_ants.task import observations
-from taichi_ants.task.choice import Choice
-from taichi_ants.task.field import TRAIL, Field
 from taichi_ants.task.observations import Observation
-from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
 
 Delivery = Literal["terminates", "truncates"]
-# Settings of castes that need a table of action values, or certain rules of choice.
-_OF_TABLES = ("policy", "epsilon", "epsilon_spread", "learning_rate", "discount")
-_OF_CHOICE = {
-    setting.name: setting.rule.only[1:]
-    for setting in declared(Choice)
-    if setting.rule.only and setting.name in Caste.__dataclass_fields__
-}
 
 
 @dataclass(frozen=True)
@@ -162,28 +155,8 @@ class Task(Settings, path="task"):
         object.__setattr__(self, "rules", Named({**used, **others}))
 
     def _faults(self) -> Iterator[str]:
-        choice = self.choice
-        without_states = choice.rule == "deneubourg" or (choice.own_rule and self.noise.misread)
-        if without_states and self.observation != "paper":
-            yield (
-                f"`task.observation` is {self.observation!r}; it must be 'paper' if "
-                f"`task.choice.rule` is {choice.rule!r} and `task.noise.misread` "
-                f"{self.noise.misread}."
-            )
-        if choice.carriers_follow is not None and self.homing_cue not in CUES:
-            yield (
-                f"`task.choice.carriers_follow` is {choice.carriers_follow!r}, but "
-                f"`task.homing_cue` is {self.homing_cue!r}, which ants with food follow already; "
-                "leave one of them out."
-            )
-        for name in (TRAIL, *CUES, ALL, NOTHING):  # the last two have a meaning in `lays`
-            if name in self.fields:
-                yield (
-                    f"`task.fields` has a field {name!r}, but that name is taken; choose another "
-                    "name."
-                )
         for what, field_name, *more in self._names_of_fields():
-            known = (*more, TRAIL, *self.fields)
+            known = (*more, *self.pheromones)
             if field_name is not None and field_name not in known:
                 yield (
                     f"{what} is {shown(field_name)}; it must be one of {', '.join(known)}, or the "
@@ -194,15 +167,6 @@ class Task(Settings, path="task"):
         nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
         for nest in (nests or {0}) if self.castes else ():
             parts_in(self.castes, nest)  # raises AntsError
-        unused = [] if choice.needs_table else [*_OF_TABLES]
-        unused += [name for name, rules in _OF_CHOICE.items() if choice.rule not in rules]
-        for name, caste in self.castes.items():
-            for setting in unused:
-                if getattr(caste, setting) is not None:
-                    yield (
-                        f"`task.castes.{name}.{setting}` is {shown(getattr(caste, setting))}; "
-                        f"leave it out, because `task.choice.rule` is {choice.rule!r}."
-                    )
         rules = {rule.name: rule for rule in self.own_rules}
         for name in self.rules:
             if name not in rules:
@@ -233,8 +197,13 @@ class Task(Settings, path="task"):
             yield f"`{path}.outbound_cue`", owner.outbound_cue
             yield f"`{path}.homing_cue`", owner.homing_cue, *CUES
             if isinstance(owner, Caste):
-                for name in owner.pheromones_laid((TRAIL, *self.fields)):
+                for name in owner.pheromones_laid([*self.pheromones]):
                     yield f"a name in `{path}.lays`", name, ALL, NOTHING
+
+    @property
+    def needs_table(self) -> bool:
+        """Whether ants choose by action values."""
+        return self.choice.needs_table
 
     @property
     def own_reward(self) -> Rule | None:
@@ -244,7 +213,7 @@ class Task(Settings, path="task"):
     @property
     def own_rules(self) -> tuple[Rule, ...]:
         """Your rules that the task uses, each once."""
-        pheromones = self.pheromone, *self.fields.values()
+        pheromones = self.pheromones.values()
         of_fields = [r for p in pheromones for r in (p.own_deposit, p.own_evaporation)]
         return tuple(
             dict.fromkeys(filter(None, (self.choice.own_rule, self.own_reward, *of_fields)))
@@ -260,11 +229,6 @@ class Task(Settings, path="task"):
         kept = {name: self.rules.get(name, default) for name, default in task.rules.items()}
         object.__setattr__(task, "rules", Named(kept))
         return task if parameters == {} else super(Task, task).replace(rules=parameters)
-
-    @property
-    def has_loads(self) -> bool:
-        """Whether a cell can have more than one load of food."""
-        return any(food.loads > 1 for food in self.foods.values())
 
     @property
     def food_changes(self) -> bool:
@@ -284,11 +248,6 @@ class Task(Settings, path="task"):
             for setting in ("outbound_cue", "homing_cue")
         )
         return self.number_of(outbound), self.number_of(homing)
-
-    def with_policies(self, policy: str) -> Task:
-        """Return the task with another policy for the castes that have one."""
-        follow = [name for name, caste in self.castes.items() if caste.policy is not None]
-        return self.replace(castes={name: {"policy": policy} for name in follow})
 
     @property
     def all_cues(self) -> tuple[tuple[int, int], ...]:
@@ -334,19 +293,24 @@ class Task(Settings, path="task"):
             **probabilities(self),
         }
 
+    @property
+    def pheromones(self) -> dict[str, Pheromone]:
+        """The trail, then the fields, by name."""
+        return {TRAIL: self.pheromone, **self.fields}
+
     def pheromones_while(self, learning: bool) -> tuple[Pheromone, ...]:
         """Return the trail, then the fields, for learning or evaluation, by number.
 
         They do not evaporate if that is off.
         """
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
-        pheromones = self.pheromone, *self.fields.values()
-        return pheromones if falls else tuple(pheromone.lasting for pheromone in pheromones)
+        pheromones = self.pheromones.values()
+        return tuple(pheromone if falls else pheromone.lasting for pheromone in pheromones)
 
     @property
     def cues(self) -> tuple[str, ...]:
         """The names of all cues by number: the trail, fields; others from -1, the compass."""
-        return (TRAIL, *self.fields, *reversed(CUES))
+        return (*self.pheromones, *reversed(CUES))
 
     def number_of(self, cue: str) -> int:
         """Return the number of a cue; those of pheromones are not negative."""

@@ -259,7 +259,7 @@ class Recorder:
         sections["cells"] = snapshot.ant_cells[order]
         carrying, nests = snapshot.ant_carries[order], snapshot.ant_nests[order]
         sections["poses"] = snapshot.ant_headings[order] + 8 * carrying + 16 * nests
-        if colony.task.castes or colony.n_kinds > 1:
+        if colony.task.castes or colony.model.n_kinds > 1:
             foods = np.maximum(snapshot.ant_foods[order], 0)
             sections["groups"] = snapshot.ant_castes[order] + 16 * foods
         if self._marks:

@@ -44,7 +44,7 @@ def lab_world(number: int, seed: int = 0) -> World:
     foods, rocks, trail = map(np.flatnonzero, (ground == _FOOD, ground == _ROCK, scent == _SCENT))
     return World(
         grid.ranges,
-        grid.cells((queen[1] + radius) * grid.width + queen[0] + radius).tolist(),
+        (*queen, 0),
         grid.cells(foods),
         grid.cells(rocks),
         [(cell, DATA["trail"]) for cell in grid.cells(trail).tolist()],

@@ -19,6 +19,7 @@ from taichi_ants import (
     train,
     worlds,
 )
+from taichi_ants.features.rule import RULES
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.measures.measure import MEASURES
 from taichi_ants.studies.points import EVALUATION_SEEDS
@@ -117,7 +118,7 @@ def test_policies_can_vary(sweep):
 
 
 def test_parameters_of_a_rule_vary_without_a_table(sweep, monkeypatch):
-    monkeypatch.setattr(rules.rule.RULES, "yours", {})
+    monkeypatch.setattr(RULES, "yours", {})
     rules.register("evaporation")(weaker)
     text = FILE.replace("[vary]", '[task]\npheromone.evaporation = "weaker"\n\n[vary]')
     text += "task.rules.weaker.rate = [0.1, 0.5]\n"

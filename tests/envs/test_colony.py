@@ -57,7 +57,6 @@ def compare_step(worlds: ColonyWorlds, world: int, plain: ReferenceColony, actio
 @pytest.mark.parametrize(
     "rules",
     [
-        {},
         {"observation": "ants", "traffic": "right_of_way", "view": "strongest"},
         pytest.param(
             {"observation": "queues", "traffic": "following", "view": "strongest_under_carriers"},
@@ -65,7 +64,7 @@ def compare_step(worlds: ColonyWorlds, world: int, plain: ReferenceColony, actio
         ),
         {"noise": NOISE},
     ],
-    ids=["paper", "foraging", "queueing", "noise"],
+    ids=["foraging", "queueing", "noise"],
 )
 def test_each_ant_of_each_world_at_every_tick(rules):
     """Ants and food come and go; now and then a world begins anew, at times with another seed."""

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from taichi_ants import AntsError, tabulate
-from taichi_ants.envs.formats import FORMATS, Shown
+from taichi_ants.envs.formats import FORMATS, ShownObservations
 from taichi_ants.task import observations
 
 
 @pytest.mark.parametrize("form", FORMATS)
 @pytest.mark.parametrize("observation", ["paper", "ants"])
 def test_a_function_gets_each_state_as_environments_show_it(observation: str, form: str) -> None:
-    shown = Shown(observations.get(observation), form)
+    shown = ShownObservations(observations.get(observation), form)
     values = np.random.default_rng(0).normal(size=(shown.observation.n_states, 5))
 
     def function(seen: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 
 from taichi_ants import Colony, Life, Task, TrainingConfig, record_colony, worlds
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
-from taichi_ants.envs.formats import FORMATS, Shown
+from taichi_ants.envs.formats import FORMATS, ShownObservations
 from taichi_ants.learners.policies import trail_follower
 
 
@@ -26,7 +26,7 @@ def test_a_data_set_is_the_same_after_minari(form, tmp_path, monkeypatch) -> Non
     data = record_colony(colony, 1, 40)
     to_minari(data, "ants/colony-v0", form)
     assert from_minari("ants/colony-v0") == data
-    loaded, shown = minari.load_dataset("ants/colony-v0"), Shown(task.sees, form)
+    loaded, shown = minari.load_dataset("ants/colony-v0"), ShownObservations(task.sees, form)
     assert loaded.total_episodes == len(data.begins) - 1
     for k, episode in enumerate(loaded.iterate_episodes()):
         rows = slice(data.begins[k], data.begins[k + 1])

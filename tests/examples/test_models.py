@@ -13,7 +13,7 @@ from command_lines import ROOT, numbers_in, run
 from model_script import table
 
 from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.rules.rule import RULES
+from taichi_ants.features.rule import RULES
 
 MODELS = ROOT / "experiments" / "models"
 

@@ -96,7 +96,7 @@ def test_every_tour_is_as_long_as_the_references(name: str, method: str, setting
 
 
 def test_all_colonies_find_the_shorter_branch() -> None:
-    result = search(double_bridge(10, 15, mirrored=True), iterations=200)
+    result = search(double_bridge(10, 15, mirrored=True), iterations=200, colonies=8)
     assert result.shortest == 6 + 10 + 3  # to the junction, over the bridge, to the pile
     assert (result.found > 0).all()
     assert (result.best[:, -20:] < result.shortest + 5).all()

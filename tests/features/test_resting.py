@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from same_colonies import every_tick
 
 from taichi_ants import Colony, TrainingConfig, worlds
@@ -31,12 +30,11 @@ def plain_doze(colony, ant):
     return ant.own["idle"]
 
 
-@pytest.mark.parametrize("learner", ["sarsa", "q_learning"])
-def test_a_resting_ant_keeps_its_food_and_drops_its_next_action(learner, monkeypatch):
+def test_a_resting_ant_keeps_its_food_and_drops_its_next_action(monkeypatch):
     monkeypatch.setitem(LABOUR.hooks, "choose", kernel_function(doze))
     monkeypatch.setattr(twin, "choose", plain_doze)
     monkeypatch.setattr(kernels, "variant", kernels.Variant)  # the cache knows the true hook
-    training = TrainingConfig(learner, 0.1, 0.9, 0.5, 1.0)
+    training = TrainingConfig("sarsa", 0.1, 0.9, 0.5, 1.0)
     world = worlds.open_world(3, (6, 6, 6))
     model, options = (world, TASK, training), {"seeds": 3, "ants": 12}
     colony, plain = Colony(*model, **options), ReferenceColony(*model, 3, 12)

@@ -100,7 +100,7 @@ PER_GROUP = 12
 def colonies_of(name: str, most: int = PER_GROUP) -> Iterator[tuple[str, RandomColony]]:
     """Yield the names and arguments of the colonies of a group, with its rules registered."""
     found = 0
-    with frozen_rules.registered():
+    with frozen_rules.registered() if GROUPS[name].rules else contextlib.nullcontext():
         for seed in itertools.count(100 * list(GROUPS).index(name)):
             if found == most:
                 return

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import own_rules
 
 from taichi_ants import rules
-from taichi_ants.rules.rule import RULES
+from taichi_ants.features.rule import RULES
 from taichi_ants.task.constants import Event
 
 

@@ -105,7 +105,7 @@ def test_a_frame_has_what_the_package_has(ask):
     assert visit["ground"] == (colony.part("ground", 0) & 15).tolist()
     stored, clock = colony.stored_pheromone(0, 0)
     levels = np.clip(stored - clock, 0, None)
-    shown = np.where(levels >= 300, 255, np.maximum(levels * 255 // 300, levels > 0))
+    shown = np.where(levels >= 300, 255, (levels > 0) * (1 + levels * 254 // 300))
     assert visit["levels"] == shown.tolist()
     steps = np.array(visit["cells"]) - visit["before"]
     assert set(steps.tolist()) <= {0, *colony.grid.offsets.tolist()}

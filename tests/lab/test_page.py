@@ -134,7 +134,7 @@ def test_the_story_follows_what_ants_do(opened):
 
 
 @pytest.mark.browser
-def test_a_visit_by_touch_on_a_phone_replays_in_python_to_the_same_hash(opened):
+def test_a_visit_by_touch_on_a_phone_replays_in_python_to_the_same_hash(opened, capsys):
     page = opened(size="phone", has_touch=True, is_mobile=True, device_scale_factor=2)
     page.until("lab.runs[0].facts.lanes >= 0")
     (ax, ay), (bx, by) = (page.point(*end) for end in page.read("lab.runs[0].suggestion()"))
@@ -156,6 +156,10 @@ def test_a_visit_by_touch_on_a_phone_replays_in_python_to_the_same_hash(opened):
     visit = lab.replay(link)
     assert visit.tick >= 400
     assert visit.hash == visit.expected_hash == page.read("lab.runs[0].engine.hash()")
+    lines = page.read("lab.address.verify()")
+    assert lines.count("\n") == 2
+    exec(lines, {})  # what a visitor would paste
+    assert capsys.readouterr().out.split() == [visit.hash]
     second = opened(f"#{link}", size="phone")
     assert second.read("lab.address.replayed.equal")
 
@@ -287,6 +291,17 @@ def test_two_halves_share_world_seed_and_strokes_and_differ_in_one_setting(opene
     page.tab.wait_for_function(f"{strokes}.every((drawn) => drawn.length)")
     left, right = page.read(strokes)
     assert left == right
+    page.tab.wait_for_function("location.hash.includes('~')")  # both halves are in the address
+
+
+@pytest.mark.browser
+def test_a_browser_without_simd_says_what_it_needs(browser):
+    context = browser.new_context(offline=True)
+    context.add_init_script("WebAssembly.Module = class { constructor() { throw Error('old'); } }")
+    tab = context.new_page()
+    tab.goto(FILE.as_uri())
+    assert tab.inner_text("#headline") == "This browser cannot run the lab."
+    context.close()
 
 
 @pytest.mark.browser
@@ -337,8 +352,12 @@ def test_a_course_page_steers_the_lab_in_a_frame(browser, tmp_path):
     facts = send(lab="strokes", strokes=[{"do": "rock", "reach": 1, "path": [[-3, 1], [5, -3]]}])
     assert facts["sides"][0]["wall"]["tick"] == tick
     assert send(lab="set", name="nest", value=1)["message"].startswith("set: nest is not one of")
+    assert send(lab="speed", value=100)["message"] == "speed: 100 is not between 0.1 and 64."
     assert send(lab="fly")["message"].startswith("fly is not one of")
     assert send(lab="start", scene="copies")["story"] == "ask-copies"
+    assert send(lab="say", option=9)["message"] == "say: 9 is not between 0 and 2."
+    assert send(lab="say", option=2)["story"] == "run-copies"
+    assert send(lab="say", option=2)["lab"] == "error"
 
 
 @pytest.mark.browser

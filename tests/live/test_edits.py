@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plain_interventions import Interventions as PlainInterventions
 from random_choices import NO_NOISE, NOISE
 from random_colonies import random_colony
 from random_edits import apply_to_both, random_edit
@@ -17,7 +18,6 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.layout import NestRow, Stage, WorldRow
 from taichi_ants.interventions import Place
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.interventions import Interventions as PlainInterventions
 from taichi_ants.task import foraging
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 

@@ -25,13 +25,13 @@ from taichi_ants import (
     rules,
 )
 from taichi_ants import task as tasks
+from taichi_ants.features.rule import RULES
 from taichi_ants.files import archives
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.live import session as session_module
 from taichi_ants.live.choices import sliders
 from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
-from taichi_ants.rules.rule import RULES
 from taichi_ants.settings import Setting
 from taichi_ants.viewer import Recording
 from taichi_ants.viewer.frames import CLOCK, POINT
@@ -75,7 +75,6 @@ SETUPS = {
     "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="independent"),
     "nests": Setup(TWO_NESTS, tasks.foraging(), LEARNS, 20, 40, 3, 25),
     "rules": Setup("open", OWN, LEARNS, 20, world_settings=SMALL),
-    "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL),
 }
 BUMP = RULES.yours.pop("live_bump")  # registered only while the tests of this file run
 LATER = ("queueing", "lively")

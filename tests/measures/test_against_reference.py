@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_colonies import random_colony
+from plain_measures import MEASURES, measured
+from random_colonies import mortal, random_colony
 
 from taichi_ants import Colony, TrainingConfig, measures, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.measures import MEASURES, measured
 from taichi_ants.task import foraging
 
 EVERY, EPISODES, TICKS = 3, 2, 20
@@ -53,6 +53,7 @@ def test_measures_equal_the_reference(schedule, threads, changes):
         drawn = random_colony(
             seed, sharing="frozen", learner="q_learning", dense=changes, changes=changes
         )
+        drawn = mortal(drawn) if changes else drawn
         rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
         seeds = (drawn.seed, 7)
         given = drawn.world, drawn.task, drawn.training
@@ -92,7 +93,7 @@ def test_births_that_wait_equal_the_reference():
 @pytest.mark.parametrize("schedule", ["by_chunk", pytest.param("by_world", marks=pytest.mark.slow)])
 def test_reading_changes_nothing(schedule):
     for seed in range(3):
-        drawn = random_colony(seed, sharing="shared", learner="q_learning", dense=False)
+        drawn = random_colony(seed, learner="q_learning", dense=False, changes=True)
         colonies, results = [], []
         for asked in ({}, {"measures": measures.names(), "every": 1}):
             given = drawn.world, drawn.task, drawn.training, (1, 2)

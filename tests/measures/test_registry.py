@@ -10,7 +10,7 @@ import pytest
 from taichi_ants import AntsError, Colony, TrainingConfig, When, measures, summary, train, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.measures.measure import MEASURES
-from taichi_ants.measures.series import Recorder
+from taichi_ants.measures.series import SeriesRecorder
 
 FROZEN = {"sharing": "frozen", "q_values": trail_follower()}
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
@@ -53,7 +53,7 @@ def test_your_own_measure_is_read_as_the_others():
 
 
 def test_a_world_has_one_row_for_a_tick():
-    ours, recorder = colony(), Recorder("deliveries")
+    ours, recorder = colony(), SeriesRecorder("deliveries")
     ours.begin_episode()
     for _ in range(2):
         recorder.read(ours)

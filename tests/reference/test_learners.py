@@ -11,7 +11,7 @@ from colonies import GAMMA, training
 from transitions import transition, values_of
 
 from taichi_ants.reference import LEARNERS
-from taichi_ants.reference.choice import choose_action
+from taichi_ants.reference.features.choice import choose_action
 from taichi_ants.reference.random_stream import RandomStream
 
 

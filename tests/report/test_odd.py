@@ -40,7 +40,7 @@ def values_in(text):
 
 
 def of_task(task, **more):
-    without = {} if task.choice.needs_table else {"episodes": 0}
+    without = {} if task.needs_table else {"episodes": 0}
     return text_of(ColonyPoint(worlds.paper(), task, SARSA, **{"ants": 4, **without, **more}))
 
 
@@ -98,7 +98,7 @@ def test_every_setting_that_differs_has_its_value(seed):
     task = random_task(np.random.default_rng(seed))
     found, wanted = values_in(of_task(task)), differing(task)
     cues = {"pheromone" if one == "trail" else one for one in (task.outbound_cue, task.homing_cue)}
-    learns = task.choice.needs_table
+    learns = task.needs_table
     for name, value in wanted.items():
         *_, group, own = name.split(".")
         is_used = own != "view" or group in cues

@@ -7,7 +7,7 @@ import importlib
 import own_rules
 import pytest
 
-from taichi_ants.rules.rule import RULES
+from taichi_ants.features.rule import RULES
 
 RULES.yours.clear()
 

@@ -47,7 +47,7 @@ def test_every_tick_with_rules_of_users(model):
         task = drawn.task.replace(
             **changes, **({} if arguments.get("changes") else {"life": Life()})
         )
-        needs = task.choice.needs_table
+        needs = task.needs_table
         drawn = replace(drawn, task=task, training=drawn.training if needs else None)
         q_values = drawn.q_values if needs else None
         given = (drawn.world, task, drawn.training, drawn.seed)

@@ -23,11 +23,11 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.engines import own_rules as own_rules_of_kernels
+from taichi_ants.features.rule import RULES, words
 from taichi_ants.interventions import SetTask
 from taichi_ants.reference import observations as twins
 from taichi_ants.rules import pick
 from taichi_ants.rules.inputs import KINDS
-from taichi_ants.rules.rule import RULES, words
 from taichi_ants.task import Choice, Observation, observations
 from taichi_ants.task.model import Model
 from taichi_ants.task.observations import observation as seen
@@ -52,7 +52,7 @@ def test_a_task_names_rules_and_their_parameters():
     assert list(greedy.rules) == ["weaker", "power_law"]
     assert greedy.replace(choice="weber").rules["weber"].k == 20.0
     assert task.pheromone.dense
-    assert not task.choice.needs_table
+    assert not task.needs_table
     assert Choice("restless").needs_table
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plain_interventions import Protocol
 from random_castes import drawn_castes
 from random_choices import NOISE
 from random_colonies import RandomColony, random_colony, with_nests
@@ -21,7 +22,6 @@ from taichi_ants import AntsError, Colony
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.protocol import ProtocolEvent
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.interventions import Protocol
 
 TICKS, EPISODES = 50, 2
 TRAIL = {"evaporation": "power_law", "half_life": None, "deposit": "weaker", "cap": None}
@@ -112,7 +112,7 @@ def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[ProtocolEvent]
     if castes[1]:  # your rules can read thresholds; `drawn_castes` draws others
         changes = {"labour": "thresholds", "castes": {"one": {"threshold": 1.0}}, **changes}
     drawn = replace(drawn, task=drawn.task.replace(**changes))
-    if not drawn.task.choice.needs_table:
+    if not drawn.task.needs_table:
         drawn = replace(drawn, training=None, q_values=None)
     made = drawn_castes(drawn, seed, *castes)
     if made is None or made.world.n_nests != nests:

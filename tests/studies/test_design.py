@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from SALib.test_functions import Ishigami
 
 from taichi_ants import files
+from taichi_ants.analysis.sensitivity import indices, report
 from taichi_ants.analysis.statistics import RANDOM_SEED
 from taichi_ants.errors import AntsError
-from taichi_ants.studies.design import Design, Range, indices, report, value_at
+from taichi_ants.studies.design import Design, Range, value_at
 from taichi_ants.studies.sweep import plan, sweep_of
 
 SHARES, NAMES = st.floats(0, 1), ("x1", "x2", "x3")

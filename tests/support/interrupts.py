@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import pytest
 
@@ -17,15 +16,15 @@ def interrupted_after_launch(number: int = 1) -> Iterator[None]:
     runtime.start()
     from taichi_ants.engines.launch import Launch
 
-    usual, done = Launch.__call__, []
+    usual, done = Launch._launch, []
 
-    def launch(self: Launch, values: Mapping[str, Any]) -> None:
-        usual(self, values)
+    def launch(self: Launch) -> None:
+        usual(self)
         done.append(self)
         if len(done) == number:
             raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Launch, "__call__", launch)
+        patch.setattr(Launch, "_launch", launch)
         with pytest.raises(KeyboardInterrupt):
             yield

@@ -60,7 +60,7 @@ def _caste(rng: np.random.Generator, drawn: RandomColony) -> dict[str, Any]:
     able: dict[str, Any] = {"lifespan": int(rng.integers(1, 25))}
     if rule == "deneubourg":
         able |= {"k": float(rng.choice([0.5, 100.0])), "exponent": float(rng.choice([0, 1.5, 4]))}
-    elif task.choice.needs_table:
+    elif task.needs_table:
         able["epsilon"] = float(rng.choice([0.0, 0.2, 1.0]))
         able["learning_rate"] = float(rng.choice([0.02, 0.5, 1.0]))
         able["discount"] = float(rng.choice([0.0, 0.5, 0.95]))
@@ -69,7 +69,7 @@ def _caste(rng: np.random.Generator, drawn: RandomColony) -> dict[str, Any]:
     if task.life.lifespan is None and not task.life.births:
         del able["lifespan"]
     found: dict[str, Any] = {name: value for name, value in able.items() if rng.random() < 0.5}
-    follows = task.choice.needs_table and drawn.sharing != "independent"
+    follows = task.needs_table and drawn.sharing != "independent"
     if follows and task.observation == "paper" and rng.random() < 0.3:
         found["policy"] = str(rng.choice(["random", "trail_follower"]))
     if found.get("epsilon") == 0.2 and "discount" not in found:  # without a draw

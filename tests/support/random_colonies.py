@@ -120,6 +120,12 @@ def random_colony(
     )
 
 
+def mortal(drawn: RandomColony) -> RandomColony:
+    """Return a random colony whose ants die; ants that are only born need kernels of their own."""
+    life = drawn.task.life
+    return replace(drawn, task=drawn.task.replace(life={"lifespan": life.lifespan or 29}))
+
+
 def with_nests(drawn: RandomColony, seed: int, nests: int, kinds: int, loads: bool) -> RandomColony:
     """Return a random colony in a world with more queens, kinds of food, and loads in cells.
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from plain_interventions import Interventions as PlainInterventions
 
 from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.live.choices import sliders
-from taichi_ants.reference.interventions import Interventions as PlainInterventions
 from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.task.constants import EMPTY
 

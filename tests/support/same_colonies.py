@@ -8,7 +8,7 @@ import numpy as np
 
 from taichi_ants import Colony, World, features
 from taichi_ants.engines.colony.layout import FoodSourceRow, NestRow, WorldRow
-from taichi_ants.features.feature import ANT, NEST
+from taichi_ants.features.feature import ANT, CELL, NEST
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import FOOD
 
@@ -49,28 +49,22 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
         assert column.tolist() == [getattr(ant, name) for ant in theirs], name
     for _, array in features.arrays(ANT):
         column = getattr(colony, array.view)[world, slots]
-        expected = np.array(
-            [ant.own.get(array.name, getattr(ant, array.name, 0)) for ant in theirs], column.dtype
-        )
+        of_ants = [ant.own.get(array.name, getattr(ant, array.name, 0)) for ant in theirs]
+        expected = np.array(of_ants, column.dtype)
         assert np.array_equal(column, expected), array.name
     executed, rewards = colony.executed[world, slots], colony.rewards[world, slots]
     for action, reward, ant in zip(executed.tolist(), rewards.tolist(), theirs, strict=True):
         assert ant.action < 0 or (action, reward) == (ant.executed, ant.reward)
-    if colony.n_kinds > 1:
-        for kind, ant in zip(mine["kind"], theirs, strict=True):
-            assert not ant.carries or kind == ant.kind
     existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
     assert ours.ground[places].tolist() == list(plain.world.ground.values())
     food = np.flatnonzero(ours.ground == FOOD)
     at = world * grid.size + food
     their_foods = [tuple(cell) for cell in grid.cells(food).tolist()]
-    if colony.n_kinds > 1:
-        kinds = [plain.world.kinds[cell] for cell in their_foods]
-        assert arrays["kind_of"][at].tolist() == kinds
-    if colony.task.has_loads:
-        loads = [plain.world.loads[cell] for cell in their_foods]
-        assert arrays["loads"][at].tolist() == loads
+    for feature, array in features.arrays(CELL):
+        if feature.is_used(colony.task):
+            held = [plain.world.of_cells[cell][array.name] for cell in their_foods]
+            assert arrays[array.name][at].tolist() == held, array.name
     levels = np.array([plain.world.trail.level(cell) for cell in plain.world.ground])
     assert np.array_equal(ours.trail[places], levels.astype(ours.trail.dtype))
     assert list(ours.fields) == [*plain.world.pheromones]

@@ -123,7 +123,7 @@ REFUSED = [
     (lambda: Task(homing_cue="hoem"), f"is 'hoem'; it must be one of {SENSES}, trail, {ADD}"),
     (lambda: Task(outbound_cue="compass"), f"is 'compass'; it must be one of trail, {ADD}"),
     *(
-        (lambda name=name: Task(fields={name: {}}), f"has a field {name!r}, but that name is taken")
+        (lambda name=name: Task(fields={name: {}}), f"has a field {name!r}, a name that is taken")
         for name in ("trail", "compass", "all", "none")
     ),
     (lambda: Field(slop=3), f"task.fields.NAME.slop` {UNKNOWN}slope."),

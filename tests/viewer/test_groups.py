@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from playback import unpack
 
 from taichi_ants import Colony, TrainingConfig, World
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.interventions import Place
-from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task import Caste, Food, Labour, Threshold, foraging
 from taichi_ants.viewer import Recorder
 
@@ -35,16 +33,9 @@ WORLD = World(
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 1.0)
 
 
-def begun(**options) -> Colony:
-    colony = Colony(WORLD, MANY, CONFIG, 4, ants=30, start="spread", **options)
+def test_frames_have_castes_kinds_of_food_and_rewards():
+    colony = Colony(WORLD, MANY, CONFIG, 4, ants=30, start="spread")
     colony.begin_episode()
-    return colony
-
-
-@pytest.mark.parametrize("sharing", ["shared", "frozen"])
-def test_frames_have_castes_kinds_of_food_and_rewards(sharing):
-    follow = {"q_values": trail_follower("ants")} if sharing == "frozen" else {}
-    colony = begun(sharing=sharing, **follow)
     recorder, kinds = Recorder(colony), np.zeros(colony.grid.size, np.uint8)
     frame, seen = unpack(recorder.types, recorder.snapshot()), set()
     for tick in range(150):

@@ -7,8 +7,8 @@ import pytest
 from browser import Page, started
 
 from taichi_ants import Colony, Task, TrainingConfig, rules, worlds
+from taichi_ants.features.rule import RULES
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.rules.rule import RULES
 from taichi_ants.task import Caste, Choice, Life, Noise, foraging
 from taichi_ants.task.constants import ACTION_NAMES
 from taichi_ants.viewer import record_colony, save_page

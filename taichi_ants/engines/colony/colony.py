@@ -13,7 +13,7 @@ from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, checked_whole, entries_of, shown
 from taichi_ants.measures.measure import Measure
-from taichi_ants.measures.series import Recorder, stops
+from taichi_ants.measures.series import SeriesRecorder, stops
 from taichi_ants.protocol import ProtocolEvent
 from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.worlds.world import World
@@ -90,7 +90,7 @@ class Colony(TickingColony):
             pairs = zip(self.checked_worlds(place), self.seeds, strict=True)
             for world, seed in dict.fromkeys(pairs):
                 world.start(seed, self.ants, self.start)  # raises an error if there is no room
-        recorder, timetable = Recorder(measures, every), Timetable(self, protocol, ticks)
+        recorder, timetable = SeriesRecorder(measures, every), Timetable(self, protocol, ticks)
         outcomes = []
         for episode in range(episodes):
             self.begin_episode(ticks, places[episode])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -52,6 +53,13 @@ class ColonyEpisodes(Record, Tidy):
     def food_deliveries(self) -> np.ndarray:
         """Deliveries by kind of food, (episodes, worlds, kinds)."""
         return self.deliveries_by_nest_and_kind.sum(axis=2, dtype=np.int32)
+
+    def of_world(self, w: int) -> dict[str, Any]:
+        """Return the counts of a world in the first episode, as in `Snapshot.counts`."""
+        counts: dict[str, Any] = {name: int(array[0, w]) for name, array in self.counts().items()}
+        for name in ("nest_deliveries", "food_deliveries", "caste_deliveries"):
+            counts[name] = getattr(self, name)[0, w]
+        return counts
 
     def counts(self) -> dict[str, np.ndarray]:
         """Return the arrays of all counts of worlds by name."""

@@ -27,7 +27,7 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
-from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, FoodRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.errors import AntsError, as_array, count
 from taichi_ants.features.cues import arrays_of
@@ -37,7 +37,6 @@ from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.interventions import Intervention, flat_indices
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
-from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import World, free_cells
 
 Change = Iterator[None]  # yields once, between its checks and its effects
@@ -84,22 +83,20 @@ class _World:
 
     def move(self, change: language.Move) -> Change:
         cell, to = flat_indices(self.colony.grid, change.cells)
-        what, number, loads = int(self.view("ground")[cell]), 0, None
+        what, number = int(self.view("ground")[cell]), 0
         if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
             yield
             return
         if what == QUEEN:
             number = int(np.argmax(self.queen_cells == cell))
-        if what == FOOD and self.colony.n_kinds > 1:
-            number = int(self.view("kind_of")[cell])
-        if what == FOOD and self.colony.task.has_loads:
-            loads = int(self.view("loads")[cell])
-        yield from self._carry(cell, to, what, number, loads)
+        if what == FOOD:
+            number = int(self.colony.food_kinds[self.w, cell])
+        yield from self._carry(cell, to, what, number)
 
     def trail(self, change: language.SetTrail) -> Change:
         everywhere = np.flatnonzero(self.colony.grid.exists)
         cells = everywhere if change.cells is None else self._index(change.cells)
-        number = [TRAIL, *self.colony.task.fields].index(change.field)
+        number = [*self.colony.task.pheromones].index(change.field)
         yield
         self._lay(cells[self.view("walls")[cells] == 0], change.level, number)
 
@@ -148,12 +145,15 @@ class _World:
         self._step_aside(ants, to)
         self._fill(there, what, kind)
 
-    def _carry(self, cell: int, to: int, what: int, number: int, loads: Any = None) -> Change:
+    def _carry(self, cell: int, to: int, what: int, number: int) -> Change:
         """Move what is in a cell to another one; see `_fill`."""
         yield from self._start_with([cell, to], [EMPTY, what | number << _NUMBER])
         self._step_aside(*self._aside(np.array([to])))
         self._fill(np.array([cell]), EMPTY)
-        self._fill(np.array([to]), what, number, loads)
+        self._fill(np.array([to]), what, number)
+        for feature in self.colony.model.features:
+            for name in feature.filled(self.colony, number) if what == FOOD else ():
+                self.view(name)[to] = self.view(name)[cell]
 
     def _add_some(self, n: int, nest: int | None = None) -> Change:
         """Put newborn ants on free start cells; without a nest, nests take turns.
@@ -224,7 +224,7 @@ class _World:
                 f"{count(int(room), 'free cell')}; leave more cells free, or choose fewer ants."
             )
 
-    def _fill(self, cells: np.ndarray, what: int, number: int = 0, loads: Any = None) -> None:
+    def _fill(self, cells: np.ndarray, what: int, number: int = 0) -> None:
         """Make cells without ants EMPTY, OBSTACLE or FOOD, by default with all loads, or one QUEEN.
 
         `number` is the kind of the food, or the nest of the queen. See `food_sources.changed`.
@@ -241,11 +241,9 @@ class _World:
             world = World(grid.ranges, grid.cells(cells[0]).tolist())
             for name, make in arrays_of(colony.model.senses).items():
                 self.view(name).reshape(colony.n_nests, -1)[number] = make(world, 0)
-        if what == FOOD and colony.n_kinds > 1:
-            self.view("kind_of")[cells] = number
-        if what == FOOD and colony.task.has_loads:
-            full = arrays["food_numbers"][FoodRow.LOADS, number]
-            self.view("loads")[cells] = full if loads is None else loads
+        for feature in colony.model.features:
+            for name, value in feature.filled(colony, number).items() if what == FOOD else ():
+                self.view(name)[cells] = value
         if colony.model.food_changes:
             room = colony.n_food_sources
             sources = [food_sources.of_world(arrays, w, room) for w in range(len(colony.worlds))]

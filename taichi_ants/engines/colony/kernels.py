@@ -23,6 +23,7 @@ from taichi_ants.features import hooks_at
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
+from taichi_ants.task.rules.policy import BY_LEVELS, BY_VALUES
 
 ANTS, CELLS, STATES, WORLD = "ants", "cells", "states", "world"
 
@@ -30,9 +31,9 @@ ANTS, CELLS, STATES, WORLD = "ants", "cells", "states", "world"
 class Phase(NamedTuple):
     """A part of a tick that all ants, cells, states or worlds (`of`) finish together.
 
-    It must not read values that another chunk writes in the same phase. `do` is a `ti.func`. Its
-    arguments are (c, v, w, chunk, ant, tick) for ANTS, (c, v, place, tick) for CELLS, and
-    (c, v, w, tick) for WORLD. For STATES they are (c, v, w, first, last), a range of the states.
+    It must not read values that another chunk writes in the same phase. `do` is a `ti.func` with
+    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place, tick) for CELLS, (c, v, w, tick)
+    for WORLD. For STATES, a range of the states of all tables, they are (c, v, w, first, last).
     """
 
     of: str
@@ -58,7 +59,9 @@ class Variant:
         self.at = hooks_at(model.features)
         self.entries = entries_of(model)
         own = own_inputs.own_rules(model.rules)
-        self.draw_by_cues = steps.draw_cell if model.choice == "deneubourg" else None
+        self.draw_by_values, _ = BY_VALUES.get(model.choice, (None, None))
+        self.attraction, self.choose_cell = BY_LEVELS.get(model.choice, (None, None))
+        self.draw_by_cues = steps.draw_cell if self.choose_cell else None
         if model.choice_rule:
             self.draw_by_cues = own[model.choice_rule].choose
         self.own_reward = model.reward_rule and own[model.reward_rule].pay

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import fields
 from enum import IntEnum, auto
 from typing import Any
 
@@ -12,7 +11,6 @@ from taichi_ants.errors import check_one_of
 from taichi_ants.features import arrays
 from taichi_ants.features.castes import CASTES
 from taichi_ants.features.feature import ANT, Array
-from taichi_ants.features.foods import Food
 from taichi_ants.runtime import MAX_THREADS
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
 from taichi_ants.task.model import Model
@@ -42,8 +40,6 @@ _CORE = (
     # The next action if it is drawn already, else -1.
     Array("next_action", ANT, "i1", "next_actions", start=-1),
     Array("nest", ANT, "i1", "nests", "i4"),
-    # The kind of the last food that it picked up.
-    Array("kind", ANT, "i1", "kinds", "i4"),
 )
 # The arrays with an entry for each slot by name; of features, too.
 COLUMNS = {array.name: array for array in (*_CORE, *(array for _, array in arrays(ANT)))}
@@ -57,7 +53,6 @@ def columns_of(model: Model) -> list[Array]:
         "executed": model.slips,
         "next_action": model.draws_next_action,
         "nest": model.n_nests > 1,
-        "kind": model.n_kinds > 1,
         **{array.name: feature in model.features for feature, array in arrays(ANT)},
     }
     return [array for name, array in COLUMNS.items() if needs.get(name, True)]
@@ -154,8 +149,6 @@ def _rows(names: Iterable[str]) -> Any:
 
 # Rows of `castes`, one column for each caste; numbers of other features follow.
 CasteRow = _rows(CASTES.of_castes)
-# Rows of `food_numbers`, one column for each kind of food: the settings of `Food`.
-FoodRow = _rows(field.name for field in fields(Food))
 
 
 class FoodSourceRow(IntEnum):

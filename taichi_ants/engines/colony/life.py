@@ -13,7 +13,7 @@ from taichi_ants.engines.colony.columns import chunks_of, function, put, trait
 from taichi_ants.engines.colony.layout import FoodSourceRow, NestRow, Stage, Tally, WorldRow
 from taichi_ants.engines.colony.learning import reset_slot
 from taichi_ants.engines.colony.steps import tally
-from taichi_ants.engines.colony.views import ant_view, nest_view
+from taichi_ants.engines.colony.views import ant_view, cell_view, nest_view
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
 from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, OBSTACLE, QUEEN, Event
 from taichi_ants.task.rules.policy import bit_number
@@ -169,10 +169,8 @@ def grow_old(c, v, w, chunk, ant, tick):
             index = w * c.size + c.cell[ant]
             c.ground[index] = ti.cast(left_behind, ti.u8)
             if left_behind == FOOD:
-                if ti.static(v.n_kinds > 1):
-                    c.kind_of[index] = ti.cast(trait(c.kind, ant), ti.u8)
-                if ti.static(v.has_loads):
-                    c.loads[index] = 1
+                for dropped in ti.static(v.at["dropped"]):
+                    dropped(ant_view(c, v, w, ant), cell_view(c, v, index))
 
 
 @function
@@ -184,16 +182,13 @@ def regrow(c, v, w, tick):
         waits, kind = c.regrowth, 0
         if ti.static(v.n_kinds > 1):
             kind = c.food_sources[FoodSourceRow.KIND, source]
-        if ti.static(v.has_foods):
-            waits = c.food_numbers[layout.FoodRow.REGROWTH, kind]
         index = place_of(c, w, source)
+        for wait in ti.static(v.at["waits"]):
+            waits = wait(cell_view(c, v, index), kind, waits)
         if waits >= 0 and taken >= 0 and tick >= taken + waits and c.ground[index] == EMPTY:
             grown = 1
-            if ti.static(v.n_kinds > 1):
-                c.kind_of[index] = ti.cast(kind, ti.u8)
-            if ti.static(v.has_loads):
-                grown = c.food_numbers[layout.FoodRow.LOADS, kind]
-                c.loads[index] = grown
+            for filled in ti.static(v.at["filled"]):
+                grown = filled(cell_view(c, v, index), kind, grown)
             c.ground[index] = FOOD
             c.source_of[index] = source
             c.food_sources[FoodSourceRow.TAKEN, source] = -1

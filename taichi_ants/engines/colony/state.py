@@ -25,7 +25,6 @@ from taichi_ants.engines.colony.layout import (
     TALLY_WIDTH,
     TOTALS,
     TOUCHED_LINE,
-    FoodRow,
     NestRow,
     Order,
     Stage,
@@ -38,10 +37,9 @@ from taichi_ants.engines.colony.layout import (
 )
 from taichi_ants.engines.layout import compass_of, note_best_actions
 from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole
-from taichi_ants.features import arrays
+from taichi_ants.features import FEATURES, arrays, numbers, used_by, without_files
 from taichi_ants.features.cues import arrays_of
-from taichi_ants.features.feature import ANT, CASTE, NEST, Array
-from taichi_ants.features.foods import food_numbers
+from taichi_ants.features.feature import ANT, CELL, NEST, Array
 from taichi_ants.features.support import COLONY
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
@@ -51,8 +49,7 @@ from taichi_ants.learners.learner import Memory
 from taichi_ants.learners.policies import check_finite, checked_values, frozen_policy
 from taichi_ants.records import Snapshot, same
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW, Event
-from taichi_ants.task.field import TRAIL
+from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
 from taichi_ants.task.model import Model
 from taichi_ants.worlds.world import Start, World
 
@@ -83,7 +80,9 @@ def _view_of(array: Array) -> property:
     def read(state: ColonyState) -> np.ndarray:
         shape = len(state.seeds), state.sizes[array.per]
         entries = state.arrays.get(array.name, state.arrays.get(array.instead))
-        entries = np.zeros(shape) if entries is None else entries.reshape(shape)
+        if entries is None or entries.size != math.prod(shape):
+            entries = np.zeros(shape)
+        entries = entries.reshape(shape)
         return entries.astype(array.shown_as) if array.shown_as else entries
 
     return property(read)
@@ -99,7 +98,7 @@ class ColonyState:
         is_given_actions: Whether ants take the actions passed to `Colony.act`.
         one_a_slot: Whether each slot has its own table of action values, not each world.
         n_nests: The number of nests in each world.
-        n_kinds: The number of kinds of food in the task, at least 1.
+        sizes: The numbers of slots, nests, cells, and what features count, in each world.
         pheromones: The trail, then the further fields, with or without evaporation, by number.
         memory: The size of the learner's memory for each table.
         stored: The names of the arrays in a file.
@@ -148,22 +147,19 @@ class ColonyState:
         self.sharing, self.learns = sharing, sharing != "frozen"
         given = arguments.checked_training(training, task, sharing, q_values is not None)
         self.has_training, self.training = given is not None, given or _NO_TRAINING
-        self.is_given_actions = task.choice.needs_table and not self.has_training
+        self.is_given_actions = task.needs_table and not self.has_training
         table = None if q_values is None else checked_values(q_values, task)
         self.seeds = arguments.checked_seeds(seeds)
         running = runtime.start(threads, arch)
         runtime.check_on_cpu(running, "colonies run")
         self.schedule = schedule_of(schedule, len(self.seeds), self.capacity)
-        self.n_kinds, self.n_nests = max(1, len(task.foods)), 0
+        self.n_nests = 0
         worlds = self.checked_worlds(world)
         self.n_nests, shape = worlds[0].n_nests, () if table is None else table.shape
         # A table (W, n, ...) is by nest if n is the number of several nests, see `owners`.
         by_slot = len(shape) == 4 and (self.n_nests == 1 or shape[1] != self.n_nests)
-        by_slot = by_slot and not self.learns and not task.castes
+        by_slot = by_slot and not self.learns and not any(f.tables_by for f in used_by(task))
         self.one_a_slot = by_slot or sharing == "independent"
-        for feature in self.model.features:
-            for refusal in feature.refusals(self):
-                raise AntsError(refusal)
         self.pheromones = task.pheromones_while(self.learns)
         self.memory, model = Memory(), self.model
         if model.learner is not None and (self.one_a_slot or model.plans_together):
@@ -246,12 +242,13 @@ class ColonyState:
         """The numbers of slots that own tables, or else of nests and castes if several do."""
         if self.one_a_slot:
             return {"slot": self.capacity}
-        return {per: n for per, n in self.sizes.items() if n > 1 and per != ANT}
+        return {per: n for per, n in self._groups.items() if n > 1}
 
     @property
-    def sizes(self) -> dict[str, int]:
-        """The numbers of slots, nests and castes in each world."""
-        return {ANT: self.capacity, NEST: self.n_nests, CASTE: self.model.n_castes}
+    def _groups(self) -> dict[str, int]:
+        """The numbers of nests, and of groups in a nest, whose ants share a table."""
+        by = (feature.tables_by for feature in self.model.features if feature.tables_by)
+        return {NEST: self.n_nests, **{per: self.sizes[per] for per in by}}
 
     @property
     def owners(self) -> int:
@@ -263,7 +260,10 @@ class ColonyState:
         """The table of `owners` by which the last ant in each slot acts, int32 (W, capacity)."""
         if self.one_a_slot:
             return np.tile(np.arange(self.capacity, dtype=np.int32), (len(self.seeds), 1))
-        return self.nests * np.int32(max(1, self.model.n_castes)) + self.castes
+        tables = np.zeros_like(self.nests)
+        for per, n in self._groups.items():
+            tables = tables * np.int32(n) + getattr(self, COLUMNS[per].view)
+        return tables
 
     @property
     def rewards(self) -> np.ndarray:
@@ -271,64 +271,56 @@ class ColonyState:
         if "reward" in self.arrays:
             return self.arrays["reward"].reshape(self.events.shape).copy()
         rewards = self.task.rewards.by_event()[self.events]
-        picked_up, delivered = self.arrays["food_numbers"][:2, self.kinds]
-        rewards = np.where(self.events == Event.PICKED_UP, picked_up, rewards)
-        return np.where(self.events == Event.DELIVERED, delivered, rewards)
+        for feature in self.model.features:
+            rewards = feature.paid(self, rewards)
+        return rewards
 
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
-        counts: Any = {name: array[None].copy() for name, array in self._counts().items()}
-        return ColonyEpisodes(**counts, seeds=self.seeds)
+        return self._results()
 
-    def _counts(self) -> Arrays:
-        """Return the counts of the episode (W, ...), by their names in `ColonyEpisodes`."""
-        arrays, rows, n = self.arrays, self.arrays["worlds"], len(self.seeds)
-        apart = deliveries = self.deliveries.astype(np.int32)
-        if self.model.counts_by_nest_and_kind:
-            apart = arrays["deliveries_by_nest_and_kind"]
-        return {
-            **{row.name.lower(): arrays["totals"][row] for row in TOTALS},
+    def _results(self) -> ColonyEpisodes:
+        rows, totals = self.arrays["worlds"], self.arrays["totals"]
+        counts: Arrays = {
+            **{row.name.lower(): totals[row] for row in TOTALS},
             "waiting_births": self.of_nests(NestRow.STORE).sum(axis=1, dtype=np.int32),
             **{row.name.lower(): rows[row] for row in WorldRow if row >= WorldRow.TICKS},
-            "deliveries_by_nest_and_kind": apart.reshape(n, self.n_nests, self.n_kinds),
-            "caste_deliveries": arrays.get("caste_deliveries", deliveries).reshape(n, -1),
         }
+        for feature in FEATURES:
+            counts |= feature.counts(self)
+        copies: Any = {name: array[None].copy() for name, array in counts.items()}
+        return ColonyEpisodes(**copies, seeds=self.seeds)
 
     def snapshot(self, world: int = 0) -> Snapshot:
         """Return the present state of world number `world`; arrays are copies."""
         self.check_begun()
         w = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
-        slots, further = self.living[w], {}
+        slots, levels = self.living[w], {}
+        further: dict[str, Any] = {}
         shown = {name: getattr(self, name)[w, slots] for name in (*_IN_SNAPSHOTS, *OF_ANTS)}
         ants = {f"ant_{name}": shown[name].astype(np.int32) for name in _IN_SNAPSHOTS}
         carries = self.carrying[w, slots]
         ground = self.part("ground", w).copy()
         ground[ants["ant_cells"]] = EMPTY
-        kinds = self.part("kind_of", w) if self.n_kinds > 1 else np.uint8(0)
-        for number, name in enumerate((TRAIL, *self.task.fields)):
+        for number, name in enumerate(self.task.pheromones):
             stored, clock = self.stored_pheromone(w, number)
-            further[name] = np.maximum(stored - stored.dtype.type(clock), 0)
-        of_world = {name: array[w] for name, array in self._counts().items()}
-        counts: dict[str, Any] = {name: int(n) for name, n in of_world.items() if not n.ndim}
-        apart = of_world["deliveries_by_nest_and_kind"]
-        counts["nest_deliveries"] = apart.sum(axis=1, dtype=np.int32)
-        counts["food_deliveries"] = apart.sum(axis=0, dtype=np.int32)
-        counts["caste_deliveries"] = of_world["caste_deliveries"].copy()
+            levels[name] = np.maximum(stored - stored.dtype.type(clock), 0)
+        for feature in self.model.features:
+            further |= feature.shown(self, w, slots, ground == FOOD)
         return Snapshot(
             self.grid,
             ground,
-            further[TRAIL],
+            next(iter(levels.values())),
             **ants,
             ant_carries=carries,
             ant_carried=np.where(carries, self.carried[w, slots], np.int32(0)),
-            ant_foods=np.where(carries, self.kinds[w, slots], np.int32(-1)),
-            food_kinds=np.where(ground == FOOD, kinds, np.uint8(0)),
             queens=self.queen_cells[w].copy(),
             of_ants={name: shown[name] for name in OF_ANTS},
-            fields=further,
-            counts=counts,
+            fields=levels,
+            counts=self._results().of_world(w),
             world=self.worlds[w],
+            **further,
         )
 
     def stored_pheromone(self, world: int, number: int) -> tuple[np.ndarray, int]:
@@ -359,12 +351,17 @@ class ColonyState:
 
     def checked_worlds(self, world: World | Sequence[World]) -> tuple[World, ...]:
         """Return one world per seed; AntsError if their number is wrong or one does not fit."""
-        known = len(self.seeds), self.learns, self.n_kinds, self.n_nests
-        return arguments.checked_worlds(world, *known)
+        return arguments.checked_worlds(world, len(self.seeds), self.learns, self.n_nests)
 
     def lay_out(self, worlds: tuple[World, ...]) -> None:
         """Make the arrays that depend on the worlds; AntsError if they have too few free cells."""
         self.worlds, self.grid = worlds, worlds[0].grid
+        self.sizes = {ANT: self.capacity, NEST: self.n_nests, CELL: self.grid.size}
+        for feature in FEATURES:
+            self.sizes |= {per: of(self) for per, of in feature.spaces.items()}
+        for feature in self.model.features:
+            for refusal in feature.refusals(self):
+                raise AntsError(refusal)
         self.changed = np.zeros(len(worlds), bool)
         most = max(len(world.foods) for world in worlds)
         self.make_room_for_food(most if self.model.food_changes else 0)
@@ -374,7 +371,7 @@ class ColonyState:
         """Reset all arrays of episodes, with room for n food sources in each world."""
         self.read_start(n)
         made = {name: array.copy() for name, array in self.at_start.items()}
-        made |= self._pheromones(len(self.worlds) * self.grid.size)
+        made |= self._pheromone_arrays(len(self.worlds) * self.grid.size)
         dense = self.model.dense_by_number[0]  # of the trail; the other array is not in use
         made[array_of(0, not dense)] = np.zeros(1, np.int32 if dense else np.float32)
         for dtype in ("i4", "i1", "f4"):
@@ -475,8 +472,8 @@ class ColonyState:
             self.first["nest"] = nests.astype(np.int8)
         for feature in model.features:
             self.first |= feature.columns(self)
-        ground, kinds = self._of_each(World.ground), self._of_each(World.kinds_by_cell)
-        loads = np.where(ground == FOOD, food_numbers(self.task)[FoodRow.LOADS, kinds], 0)
+        ground, of_cells = self._of_each(World.ground), self._of_each(World.kinds_by_cell)
+        is_food = ground == FOOD
         marks = (ANT_GROUND - (nests << 4)).astype(np.uint8)
         np.put_along_axis(ground, cells.astype(np.int64), marks, axis=1)
         levels = self._of_each(World.trail_levels)
@@ -493,26 +490,27 @@ class ColonyState:
             "ground": ground.reshape(-1),
             # The clock at which a cell's trail has evaporated; if dense, its level. The same for
             # each further field, which is empty at the start.
-            **self._pheromones(len(worlds)),
+            **self._pheromone_arrays(len(worlds)),
             array_of(0, model.dense_by_number[0]): levels.reshape(-1),
             "worlds": rows,
             "nests": of_nests,
-            # The kind of the food in each cell, and its loads; tiny if kernels do not need them.
-            "kind_of": kinds.reshape(-1) if self.n_kinds > 1 else np.zeros(1, np.uint8),
-            "loads": loads.reshape(-1) if model.has_loads else np.zeros(1, np.int32),
-            "deliveries_by_nest_and_kind": np.zeros(of_nests.shape[1] * self.n_kinds, np.int32),
             **{
-                array.name: np.zeros(len(worlds) * self.sizes[array.per], array.dtype)
-                for feature in model.features
-                for array in feature.arrays
-                if array.per != ANT
+                array.name: np.zeros(
+                    len(worlds) * self.sizes[array.per] if feature in model.features else 1,
+                    array.dtype,
+                )
+                for feature, array in arrays()
+                if array.per != ANT and (feature in model.features or array.always)
             },
             # Sums over all ants in this episode, see `Tally`.
             "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
             **food_sources.arrays(foods, rows, n_food_sources, self.grid.size),
         }
+        for feature in model.features:
+            for name, values in feature.filled(self, of_cells).items():
+                self.at_start[name][:] = np.where(is_food, values, 0).reshape(-1)
 
-    def _pheromones(self, n: int) -> Arrays:
+    def _pheromone_arrays(self, n: int) -> Arrays:
         """Return empty arrays (n,) of all pheromones."""
         return {
             array_of(number, dense): np.zeros(n, np.float32 if dense else np.int32)
@@ -553,8 +551,8 @@ class ColonyState:
     def seeded(self) -> Arrays:
         """Return the arrays that depend on seeds and last through all episodes."""
         seeds = words_of(self.seeds)
-        numbers = np.arange(self.capacity, dtype=np.uint64)  # more ants may start later episodes
-        first_streams = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
+        ants = np.arange(self.capacity, dtype=np.uint64)  # more ants may start later episodes
+        first_streams = stream_state(seeds[:, None], STREAM_ANT, ants[None, :])
         return {
             # By world and ant number: the last states of the streams of ants that start episodes.
             "first_streams": first_streams.reshape(-1),
@@ -570,10 +568,9 @@ class ColonyState:
         if q_values is not None:
             tables = arguments.checked_tables(q_values, n_worlds, self._axes)
             q[..., :N_ACTIONS] = tables[..., None, :, :]
-        for number, (name, caste) in enumerate(self.task.castes.items()):
-            if caste.policy is not None:
-                path = f"`task.castes.{name}.policy`"
-                table = frozen_policy(caste.policy, self.task.observation, path)
+        for feature in self.model.features:
+            for number, (policy, name) in feature.policies(self.task).items():
+                table = frozen_policy(policy, self.task.observation, name)
                 of_groups = q.reshape(n_worlds, self.n_nests, -1, *q.shape[2:])
                 of_groups[:, :, number, 0, :, :N_ACTIONS] = table
         note_best_actions(q)
@@ -617,15 +614,7 @@ class ColonyState:
     def _settings(self) -> Arrays:
         """Return the settings of the task as kernels read them."""
         task = self.task
-        settings = {
-            "rewards": task.rewards.by_event(),
-            "choice": task.choice.numbers(),
-            "food_numbers": food_numbers(task),
-        }
-        for feature in self.model.features:
-            if feature.numbers:
-                values = (getattr(feature.of(task), name) for name in feature.numbers)
-                settings[f"{feature.group}_numbers"] = np.array([value or 0.0 for value in values])
+        settings = {"rewards": task.rewards.by_event(), **numbers(task)}
         for feature in self.model.features:
             settings |= feature.constants(self)
         if task.rules:  # the parameters of your own rules
@@ -665,12 +654,12 @@ class ColonyState:
     def contents(self) -> tuple[dict[str, Any], Arrays]:
         """Return the contents of a file: facts and arrays."""
         arrays = {f"array_{name}": self.arrays[name] for name in self.stored}
-        numbers = {world: number for number, world in enumerate(dict.fromkeys(self.worlds))}
+        places = {world: place for place, world in enumerate(dict.fromkeys(self.worlds))}
         facts = {
             "task": self.task.as_dict(),
             "training": self.training.as_dict() if self.has_training else None,
-            "worlds": [world.as_dict() for world in numbers],
-            "world_of": [numbers[world] for world in self.worlds],
+            "worlds": [world.as_dict() for world in places],
+            "world_of": [places[world] for world in self.worlds],
             "one_a_slot": self.one_a_slot,
             # Interventions can add food sources.
             "food_sources": self.n_food_sources,
@@ -711,8 +700,7 @@ class ColonyState:
                 # Tables of the right shape, which the arrays of the file replace.
                 leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()
                 options["q_values"] = np.zeros((*leading, task.n_states, N_ACTIONS), np.float32)
-            # Policies of castes are in the arrays of the file; theirs may no longer exist.
-            known = task.with_policies("random")
+            known = without_files(task)  # tables are in the arrays; other files may be gone
             colony = cls([worlds[w] for w in facts["world_of"]], known, training, **options)
             colony.task, colony.length, colony.ticks = task, facts["length"], facts["ticks"]
             colony.epsilon = arguments.checked_share("epsilon", facts["epsilon"])
@@ -735,6 +723,6 @@ class ColonyState:
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
 
 
-for array in (*COLUMNS.values(), *(array for _, array in arrays(NEST))):
+for array in (*COLUMNS.values(), *(array for _, array in arrays() if array.per != ANT)):
     if array.view:
         setattr(ColonyState, array.view, _view_of(array))

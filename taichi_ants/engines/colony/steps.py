@@ -24,15 +24,15 @@ from taichi_ants.engines.colony import columns, layout, trail
 from taichi_ants.engines.colony.columns import function, nest_of, of_caste, put, trait
 from taichi_ants.engines.colony.layout import ANT_GROUND, ANT_STANDS, TALLY_WIDTH, CasteRow, Tally
 from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
-from taichi_ants.engines.colony.views import ant_view
+from taichi_ants.engines.colony.views import ant_view, cell_view
 from taichi_ants.engines.views import fill_codes
 from taichi_ants.features.cues import CUES
+from taichi_ants.features.fields import OCCASIONS
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task import constants
 from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, RIGHT, Event
-from taichi_ants.task.field import OCCASIONS
 from taichi_ants.task.rules import actions, conflicts, policy, vision
 
 
@@ -283,11 +283,9 @@ def draw_action(c, v, w, ant, state, paper_state, tick, random_state):
     else:
         table = table_of(c, v, owner_of(c, v, w, ant))
         explore_below = explore_below_of(c, v, w, ant)
-        if ti.static(v.choice == "softmax"):
-            temperature = choice_number(c, v, ant, ti.static(CasteRow.TEMPERATURE))
-            action = policy.choose_softly(
-                values_of(c.q, table, state), bits, explore_below, temperature
-            )
+        if ti.static(v.draw_by_values):
+            values = values_of(c.q, table, state)
+            action = v.draw_by_values(ant_view(c, v, w, ant), values, bits, explore_below)
         else:
             best = best_actions_of(c, v, table, state)
             action = policy.choose_in_crowd(c.compass, best, bits, explore_below)
@@ -358,17 +356,8 @@ def explore_below_of(c, v, w, ant):
 
 
 @function
-def choice_number(c, v, ant, row):
-    """Return a number of the rule by which an ant chooses, f64; `row` is a `CasteRow`."""
-    number = c.choice[row - CasteRow.TEMPERATURE]
-    if ti.static(v.n_castes > 0):
-        number = of_caste(c, ant, row)
-    return number
-
-
-@function
 def draw_cell(c, v, cues, w, ant, state, paper_state, tick, bits):
-    """Return the ant's action by the rule "deneubourg", with 64 random bits.
+    """Return the ant's action by a rule that compares levels ahead, with 64 random bits.
 
     `state` is the paper's state as the ant sees it, `paper_state` the true one. A cell that it
     misreads looks as if it had no trail, and is nearer to the queen if it looks S. With a field as
@@ -378,16 +367,14 @@ def draw_cell(c, v, cues, w, ant, state, paper_state, tick, bits):
     here = w * c.size + c.cell[ant]
     codes, opens, nears = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
     weights = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
-    k = choice_number(c, v, ant, ti.static(CasteRow.K))
-    exponent = choice_number(c, v, ant, ti.static(CasteRow.EXPONENT))
     for i in ti.static((LEFT, FORWARD, RIGHT)):
         codes[i], is_true, opens[i], nears[i] = cell_ahead(
             c, v, cues, w, ant, state, paper_state, i
         )
         index = here + actions.step_towards(c.compass, heading, i)
         level = cue_level(c, v, cues, carries, index, tick)
-        weights[i] = policy.attraction(ti.select(is_true == 1, level, 0), k, exponent)
-    return policy.choose_cell(carries, codes, opens, nears, weights, bits)
+        weights[i] = v.attraction(ant_view(c, v, w, ant), ti.select(is_true == 1, level, 0))
+    return v.choose_cell(carries, codes, opens, nears, weights, bits)
 
 
 @function
@@ -679,14 +666,8 @@ def event_reward(c, v, ant):
     """Return the reward of the last event of an ant by the settings of the task, i32."""
     event = trait(c.event, ant)
     reward = c.rewards[event]
-    if ti.static(v.has_foods):
-        if (event == Event.PICKED_UP) | (event == Event.DELIVERED):
-            kind = 0
-            if ti.static(v.n_kinds > 1):
-                kind = trait(c.kind, ant)
-            reward = c.food_numbers[layout.FoodRow.PICK_UP, kind]
-            if event == Event.DELIVERED:
-                reward = c.food_numbers[layout.FoodRow.DELIVER, kind]
+    for pays in ti.static(v.at["pays"]):
+        reward = pays(ant_view(c, v, None, ant), event, reward)
     return reward
 
 
@@ -694,11 +675,8 @@ def event_reward(c, v, ant):
 def take_load(c, v, ant, index, tick):
     """Take a load of food from a cell, which becomes empty with its last load."""
     loads_left = 0
-    if ti.static(v.n_kinds > 1):
-        put(c.kind, ant, ti.cast(c.kind_of[index], ti.i32))
-    if ti.static(v.has_loads):
-        loads_left = c.loads[index] - 1
-        c.loads[index] = loads_left
+    for took in ti.static(v.at["took"]):
+        loads_left = took(ant_view(c, v, None, ant), cell_view(c, v, index), loads_left)
     if loads_left == 0:
         c.ground[index] = EMPTY
         take_from_source(c, index, tick)

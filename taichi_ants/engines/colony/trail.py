@@ -11,9 +11,9 @@ from collections import namedtuple
 import taichi as ti
 
 from taichi_ants.engines.colony.columns import function
+from taichi_ants.features.fields import Occasion
+from taichi_ants.features.pheromone import Pheromone
 from taichi_ants.task.constants import EMPTY, OBSTACLE, PICK_UP, Event
-from taichi_ants.task.field import Occasion
-from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rules import pheromone, vision
 
 # A pheromone in kernels: whether it is dense; its view; its arrays, of which `spare` has the next

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.engines.layout import EXTRA_CELLS, Command, unpack_cells
+from taichi_ants.engines.layout import EXTRA_CELLS, Command, join, split, unpack_cells
 from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
@@ -18,16 +18,13 @@ from taichi_ants.task import Task
 from taichi_ants.worlds.world import World
 
 _STEPS_OF_LAUNCH = 1 << 23  # of all ants in a rollout; a launch cannot be interrupted
-# The arrays with one value per ant.
-_OF_ANTS: dict[type, tuple[str, ...]] = {
-    np.int32: ("start_cells", "start_headings", "ant_cells", "carried", "steps", "states")
-    + ("final_states", "deliveries", "final_deliveries"),
-    np.uint8: ("commands", "headings", "carries", "changed", "paper_states", "final_paper_states")
-    + ("results", "reasons"),
-    np.int64: ("taken",),
-    np.uint64: ("random_states",),
-    np.float64: ("rewards_of",),
-}
+# The arrays with one int32 per ant; the first ones are what environments show of a step.
+SHOWN = "states", "paper_states", "results", "reasons", "deliveries"
+_OF_ANTS = (
+    *SHOWN,
+    *("start_cells", "start_headings", "worlds", "ant_cells", "headings", "carries", "carried"),
+    *("steps", "changed", "commands", "final_states", "final_paper_states", "final_deliveries"),
+)
 
 
 class BatchedEnvironments:
@@ -39,12 +36,13 @@ class BatchedEnvironments:
     once. Trails evaporate if `falls`.
 
     Attributes:
-        arrays: Arrays by name, with one row per ant. States: paper_states uint8, states int32.
-            Results of the last step: rewards_of float64, reasons uint8 (`Reason`), and results
-            uint8, see `layout.TERMINATED`; of a rollout, only whether the episode has ended. Last
-            states of an episode that a step has restarted: final_states int32, final_paper_states
-            uint8. Deliveries of the episode, and of one that a step has restarted: deliveries,
+        arrays: Arrays by name, with one row per ant, int32 if no other type is named. States:
+            paper_states, states. Results of the last step: rewards_of float64, reasons (`Reason`),
+            and results, see `layout.TERMINATED`; of a rollout, only whether the episode has ended.
+            Last states of an episode that a step has restarted: final_states, final_paper_states.
+            Deliveries of the episode, and of one that a step has restarted: deliveries,
             final_deliveries.
+        shown: int32 (5, n), those arrays whose names are `SHOWN`.
     """
 
     def __init__(
@@ -59,7 +57,19 @@ class BatchedEnvironments:
         own = np.empty((n, size + EXTRA_CELLS), np.int32)
         own[:, :size] = common["world"].reshape(-1, size)[number]
         own[:, size:] = size, -1  # no cell has changed, see `step.restore`
-        self.arrays: dict[str, Any] = {
+        shared = {
+            name: common.pop(name) for name in ("compass", "rewards", "closer", "world", "trails")
+        }
+        of_ants = {name: np.zeros(n, np.int32) for name in _OF_ANTS} | {"worlds": number}
+        of_ants["after_end"] = np.zeros(1, np.int32)
+        self._joined = join(shared | of_ants)
+        self._others = {
+            "cells": np.concatenate([shared["world"], own.reshape(-1)]),
+            "taken": np.zeros(n, np.int64),
+            "random_states": np.zeros(n, np.uint64),
+            "rewards_of": np.zeros(n),
+        }
+        self._numbers = {
             **common,
             "n": n,
             "n_steps": 1,
@@ -67,13 +77,23 @@ class BatchedEnvironments:
             "regrows": int(ends == "continues"),
             "delivery_terminates": int(ends == "terminates"),
             "delivery_truncates": int(ends == "truncates"),
-            "after_end": 0,
             # The cells of all worlds, then the cells of each ant.
-            "shared_cells": common["world"].size,
-            "cells": np.concatenate([common["world"], own.reshape(-1)]),
-            "worlds": number,
-            **{name: np.zeros(n, kind) for kind, names in _OF_ANTS.items() for name in names},
+            "shared_cells": shared["world"].size,
         }
+        self._view()
+
+    def _view(self) -> None:
+        """Make the views of the memory, and the arguments of kernels."""
+        self.arrays = split(self._joined) | self._others
+        first = self._joined[f"{SHOWN[0]}_at"]
+        self.shown = self._joined["memory"][first : first + len(SHOWN) * self.n].reshape(-1, self.n)
+        self._arguments = {**self._joined, **self._others, **self._numbers}
+        # A launch takes 0.15 microseconds for each number, so those of a step are in an array.
+        numbers = {name: one for name, one in self._arguments.items() if isinstance(one, int)}
+        self._names = tuple(numbers)
+        self._of_steps = {**self._arguments, "numbers": np.array(list(numbers.values()), np.int32)}
+        for name in numbers:
+            del self._of_steps[name]
 
     def seed(self, seeds: Sequence[int], which: np.ndarray) -> None:
         """Set the seeds of some ants, int (k,): new random streams and start cells."""
@@ -94,9 +114,9 @@ class BatchedEnvironments:
         """Do a rollout of one step by commands (n,) to the ants, whose results are `arrays`."""
         self.arrays["taken"][:] = actions
         self.arrays["commands"][:] = commands
-        self.arrays["after_end"] = int(after_end)
+        self.arrays["after_end"][0] = after_end
         with runtime.alone:
-            self._launch(False, 0)(self.arrays)
+            self._launch(False, 0).repeat(self._of_steps)
 
     def rollout(
         self,
@@ -128,8 +148,9 @@ class BatchedEnvironments:
             self._codes = np.empty(-(-self.n // WIDTH) * CODES_OF_CHUNK, np.int64)
         steps = max(1, _STEPS_OF_LAUNCH // self.n)
         values = {
-            **self.arrays,
-            "after_end": int(after_end),
+            **self._arguments,
+            # As arrays of their own, which many steps read faster.
+            **{name: self.arrays[name] for name in ("compass", "rewards", "closer")},
             "shown": shown.reshape(-1),
             "codes": self._codes,
         }
@@ -138,35 +159,41 @@ class BatchedEnvironments:
             below = np.uint64(epsilon * 4294967296.0)
             values |= {"best": best, "choices": choices, "explore_below": below}
         self.arrays["commands"][:] = begins
+        self.arrays["after_end"][0] = after_end
         with runtime.alone:
             for first in range(0, len(rows["taken"]), steps):
                 part = {name: one[first : first + steps].reshape(-1) for name, one in rows.items()}
                 launch({**values, **part, "n_steps": len(part["taken"]) // self.n})
         self.arrays["rewards_of"][:] = rows["rewards_of"][-1]
 
-    def _launch(self, follows: bool, width: int) -> Callable[[Mapping[str, Any]], None]:
-        """Return the launch of a rollout with observations of `width` numbers."""
+    def _launch(self, follows: bool, width: int) -> Any:
+        """Return the `Launch` of a rollout with observations of `width` numbers."""
         if (follows, width) not in self._launches:
             runtime.start()  # configures Taichi before the imports below
             from taichi_ants.engines.launch import Launch
             from taichi_ants.engines.runs.rollout_kernel import WIDTH, rollout_kernel
             from taichi_ants.engines.runs.step import Rules
 
-            form = Rules.of(self.task), follows, width, self.n <= WIDTH
+            names = () if width else self._names
+            form = Rules.of(self.task), follows, width, self.n <= WIDTH, names
             self._launches[follows, width] = Launch(partial(rollout_kernel, *form))
         return self._launches[follows, width]
 
     def snapshot(self, number: int) -> Snapshot:
         """Return the present state of an ant's world; arrays are copies."""
         arrays, grid = self.arrays, self.worlds[0].grid
-        own = self.arrays["shared_cells"] + number * (grid.size + EXTRA_CELLS)
+        own = self._numbers["shared_cells"] + number * (grid.size + EXTRA_CELLS)
         ground, levels = unpack_cells(arrays["cells"][own : own + grid.size])
-        trail = np.maximum(levels - arrays["steps"][number] * arrays["evaporates"], 0)
+        trail = np.maximum(levels - arrays["steps"][number] * self._numbers["evaporates"], 0)
         one = slice(number, number + 1)
-        headings = arrays["headings"][one].astype(np.int32)
-        cells, carries = arrays["ant_cells"][one].copy(), arrays["carries"][one].astype(bool)
-        return Snapshot(grid, ground, trail, cells, headings, carries)
+        cells, headings = arrays["ant_cells"][one].copy(), arrays["headings"][one].copy()
+        return Snapshot(grid, ground, trail, cells, headings, arrays["carries"][one].astype(bool))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without Taichi's objects, so that copies and pickles work."""
-        return {**vars(self), "_launches": {}, "_codes": None}
+        parts = ("worlds", "task", "n", "_joined", "_others", "_numbers")
+        return {name: getattr(self, name) for name in parts}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _launches={}, _codes=None)
+        self._view()

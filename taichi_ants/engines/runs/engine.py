@@ -27,6 +27,7 @@ from taichi_ants.engines.layout import (
     compass_of,
     pack_cells,
 )
+from taichi_ants.features import numbers
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
@@ -116,7 +117,7 @@ def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]
         **(task.pheromone if falls else task.pheromone.lasting).numbers,
         **task.numbers,
         "rewards": task.rewards.by_event(),
-        "choice": task.choice.numbers(),
+        **numbers(task),
         # For each world: packed cells and all trails (also under food) at the start of an episode;
         # per cell a bit for each heading that leads nearer to the queen.
         "world": np.concatenate([pack_cells(world) for world in worlds]),

@@ -30,7 +30,7 @@ from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
 from taichi_ants.task.constants import ROW, Event
 from taichi_ants.task.rules.actions import step_end
-from taichi_ants.task.rules.policy import chance_of, chance_of_softly, choose, choose_softly
+from taichi_ants.task.rules.policy import BY_VALUES, chance_of, choose
 
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
 # indices are not negative.
@@ -53,6 +53,7 @@ def run_kernel(
     read = read_rates(hyperparameters)
     columns = N_SETTINGS + len(fields(hyperparameters))
     observe, executes = observe_function(rules), hooks_at(rules.features)["execute"]
+    draw, chance_of_draw = BY_VALUES.get(rules.choice, (None, None))
     n_states = rules.observation.n_states
     table = n_states * ROW
 
@@ -61,10 +62,10 @@ def run_kernel(
         """Return the next action, the stream after the draw and, if traced, the probability."""
         rng, values = advance(ant.random_state), values_of(a.q, begin, state)
         action, chance = 0, ti.f64(0.0)
-        if ti.static(rules.softly):
-            action = choose_softly(values, bits_of(rng), explore_below, a.choice[0])
+        if ti.static(draw):
+            action = draw(ant_view(a, ant), values, bits_of(rng), explore_below)
             if ti.static(traced):
-                chance = chance_of_softly(values, action, explore_below, a.choice[0])
+                chance = chance_of_draw(ant_view(a, ant), values, action, explore_below)
         else:
             action = choose(values, bits_of(rng), explore_below)
             if ti.static(traced):

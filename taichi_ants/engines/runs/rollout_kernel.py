@@ -20,6 +20,7 @@ from taichi_ants.engines.runs.step import (
     act,
     ant_view,
     observe_function,
+    parts_of,
     reason_of,
     restore,
 )
@@ -41,14 +42,20 @@ _RESULT, _ACTION = 32, 40
 
 @cache
 def rollout_kernel(
-    rules: Rules, follows: bool, width: int, serial: bool, arguments: Any
+    rules: Rules,
+    follows: bool,
+    width: int,
+    serial: bool,
+    numbers: tuple[str, ...],
+    arguments: Any,
 ) -> Callable[..., None]:
     """Return the kernel of a rollout; see `BatchedEnvironments.rollout`.
 
     If `follows`, ants choose by a table, with draws from their own streams, else they take given
     actions. `width` is the number of values in an observation, or 0 for a single step without
     observations. If `serial`, one thread does all the work, because waking others would take
-    longer. Each ant draws from its stream in the order of a colony's.
+    longer. `numbers` are the arguments that are in an array, see `parts_of`. Each ant draws from
+    its stream in the order of a colony's.
     """
     deposit, observe, single = rules.deposit, observe_function(rules), width == 0
     executes = hooks_at(rules.features)["execute"]
@@ -61,7 +68,7 @@ def rollout_kernel(
             a.taken[row] = code >> _ACTION & 7
         a.rewards_of[row] = a.rewards[result & (TRUNCATED - 1)]
         if ti.static(single):
-            a.results[row] = ti.cast(result & 255, ti.u8)
+            a.results[row] = result & 255
         else:
             a.result_rows[row] = ti.cast(result & 255, ti.u8)
         for k in ti.static(range(width)):
@@ -71,15 +78,15 @@ def rollout_kernel(
     def take_steps(a: ti.template(), i, first, n_steps, place):
         """Let ant i take steps from row `first` on; its first code is at `place`."""
         own, origin = a.shared_cells + i * (a.size + EXTRA_CELLS), a.worlds[i] * a.size
-        ant = Ant(origin=origin, cell=a.ant_cells[i], heading=ti.cast(a.headings[i], ti.i32))
-        ant.carries, ant.random_state = ti.cast(a.carries[i], ti.i32), a.random_states[i]
+        ant = Ant(origin=origin, cell=a.ant_cells[i], heading=a.headings[i])
+        ant.carries, ant.random_state = a.carries[i], a.random_states[i]
         if ti.static(deposit == FADING):
             ant.carried = a.carried[i]
-        paper_state, state = ti.cast(a.paper_states[i], ti.i32), a.states[i]
+        paper_state, state = a.paper_states[i], a.states[i]
         # Until an ant changes its world, it reads cells that all ants share.
         steps, base = a.steps[i], ti.select(a.changed[i] == 1, own, origin)
         deliveries = a.deliveries[i]
-        command, choices = ti.cast(a.commands[i], ti.i32), ti.cast(0, ti.u64)
+        command, choices = a.commands[i], ti.cast(0, ti.u64)
         if ti.static(follows):
             choices = a.choices[i]
         reason = ti.cast(Reason.NONE, ti.i32)
@@ -107,7 +114,7 @@ def rollout_kernel(
                 if ti.static(single):
                     reason = reason_of(a, into, before, ant, executed)
                 if event == Event.PICKED_UP:  # the store keeps this a branch, which is faster
-                    a.changed[i] = ti.cast(1, ti.u8)
+                    a.changed[i] = 1
                     base = own
                 steps += 1
                 deliveries += ti.cast(event == Event.DELIVERED, ti.i32)
@@ -118,17 +125,17 @@ def rollout_kernel(
                 )
                 flags = terminated * TERMINATED | truncated * TRUNCATED
                 if flags != 0:
-                    command = a.after_end
+                    command = a.after_end[0]
                     if command == Command.STEP:  # the next episode begins in the same step
                         a.final_states[(first + t) * a.n + i] = state
-                        a.final_paper_states[i] = ti.cast(paper_state, ti.u8)
+                        a.final_paper_states[i] = paper_state
                         a.final_deliveries[i] = deliveries
                         begins = 1
             seen = state
             if begins == 1:
                 if base == own:
                     restore(a, own, origin, a.cells[own + a.size], a.cells[own + a.size + 1])
-                    a.changed[i] = ti.cast(0, ti.u8)
+                    a.changed[i] = 0
                 stream = ant.random_state
                 ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])
                 ant.random_state = stream
@@ -141,17 +148,17 @@ def rollout_kernel(
                 record(a, i, code)
             else:
                 a.codes[place + t * _STRIDE] = code
-        a.ant_cells[i], a.headings[i] = ant.cell, ti.cast(ant.heading, ti.u8)
-        a.carries[i], a.random_states[i] = ti.cast(ant.carries, ti.u8), ant.random_state
+        a.ant_cells[i], a.headings[i] = ant.cell, ant.heading
+        a.carries[i], a.random_states[i] = ant.carries, ant.random_state
         if ti.static(deposit == FADING):
             a.carried[i] = ant.carried
-        a.paper_states[i], a.states[i] = ti.cast(paper_state, ti.u8), state
+        a.paper_states[i], a.states[i] = paper_state, state
         a.steps[i], a.deliveries[i] = steps, deliveries
         if ti.static(single):
-            a.reasons[i] = ti.cast(reason, ti.u8)
+            a.reasons[i] = reason
         else:
-            a.commands[i] = ti.cast(command, ti.u8)
-            a.results[i] = ti.cast(ti.select(command == Command.STEP, 0, TRUNCATED), ti.u8)
+            a.commands[i] = command
+            a.results[i] = ti.select(command == Command.STEP, 0, TRUNCATED)
         if ti.static(follows):
             a.choices[i] = choices
 
@@ -174,16 +181,20 @@ def rollout_kernel(
                     record(a, row + j, a.codes[line + j])
             first += length
 
+    @ti.func
+    def take_chunk(a: ti.template(), chunk):
+        ant, ants = chunk * WIDTH, ti.min(WIDTH, a.n - chunk * WIDTH)
+        if ti.static(single):
+            for i in range(ant, ant + ants):
+                if a.commands[i] != Command.WAIT:
+                    take_steps(a, i, 0, 1, 0)
+        else:
+            take_rows(a, ant, ants, chunk * _STRIDE * LENGTH)
+
     @ti.kernel
     def rollout(a: arguments):
         ti.loop_config(block_dim=1, serialize=serial)
-        for chunk in range((a.n + WIDTH - 1) // WIDTH):
-            ant, ants = chunk * WIDTH, ti.min(WIDTH, a.n - chunk * WIDTH)
-            if ti.static(single):
-                for i in range(ant, ant + ants):
-                    if a.commands[i] != Command.WAIT:
-                        take_steps(a, i, 0, 1, 0)
-            else:
-                take_rows(a, ant, ants, chunk * _STRIDE * LENGTH)
+        for chunk in range((parts_of(a, numbers).n + WIDTH - 1) // WIDTH):
+            take_chunk(parts_of(a, numbers), chunk)
 
     return rollout

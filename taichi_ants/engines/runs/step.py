@@ -5,11 +5,12 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import taichi as ti
+from taichi.lang.impl import subscript
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import draw_below
 from taichi_ants.engines.views import encode_function, fill_codes, view_type
-from taichi_ants.features import hooks_at, used_by
+from taichi_ants.features import NUMBERS, hooks_at, used_by
 from taichi_ants.features.feature import Feature
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.kernel_functions import Named, while_compiling
@@ -46,23 +47,21 @@ Ant = ti.types.struct(
 class Rules(NamedTuple):
     """The rules of a task that are compiled into kernels.
 
-    For `deposit` and `half`, see `rules.pheromone` and `Pheromone.view`. If `softly`, ants choose
-    by the rule "softmax".
+    For `deposit` and `half`, see `rules.pheromone` and `Pheromone.view`.
     """
 
     observation: Observation
     deposit: int
     half: bool
     features: tuple[Feature, ...]
-    softly: bool
+    choice: str
 
     @classmethod
     def of(cls, task: Task) -> "Rules":
         """Return the rules of a task."""
         pheromone = task.pheromone
         deposit, half = pheromone.numbers["deposits"], pheromone.view == "half"
-        softly = task.choice.rule == "softmax"
-        return cls(task.sees, deposit, half, used_by(task), softly)
+        return cls(task.sees, deposit, half, used_by(task), task.choice.rule)
 
 
 @while_compiling
@@ -71,7 +70,41 @@ def ant_view(a: Any, ant: Any) -> Named:
 
     Other names are those of the arrays and numbers of kernels.
     """
-    return Named(lambda name: getattr(ant if name in Ant.members else a, name))
+
+    def read(name: str) -> Any:
+        if name in NUMBERS:
+            array, place = NUMBERS[name]
+            return subscript(None, getattr(a, array), place)
+        return getattr(ant if name in Ant.members else a, name)
+
+    return Named(read)
+
+
+class Part:
+    """A part of an array, from index `first` on, while a kernel compiles."""
+
+    def __init__(self, array: Any, first: Any) -> None:
+        self.array, self.first = array, first
+
+    def __getitem__(self, index: Any) -> Any:
+        return subscript(None, self.array, self.first + index)
+
+
+@while_compiling
+def parts_of(a: Any, numbers: tuple[str, ...]) -> Named:
+    """Return the arguments of a kernel, and the arrays that `layout.join` has joined, by name.
+
+    The array `numbers` has the arguments of these names.
+    """
+
+    def read(name: str) -> Any:
+        if name in numbers:
+            return subscript(None, a.numbers, numbers.index(name))
+        if hasattr(a, name):
+            return getattr(a, name)
+        return Part(a.memory, read(f"{name}_at"))
+
+    return Named(read)
 
 
 @ti.func

@@ -7,8 +7,8 @@ evaporation costs no time. All other trails are levels (f32), which change in ev
 
 import taichi as ti
 
+from taichi_ants.features.pheromone import DEPOSITS, LINEAR
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.pheromone import DEPOSITS, LINEAR
 
 SET, ADD, FADING, NONE = range(len(DEPOSITS))
 

@@ -1,4 +1,4 @@
-"""The choice among the five actions.
+"""The choice among the five actions, the functions in kernels of `features/choice.py`.
 
 Each choice takes one draw of 64 bits. The upper word decides whether an ant explores, if its rule
 has epsilon. The lower word breaks ties, or chooses by weights: with u = word * 2^-32 * (sum of the
@@ -135,18 +135,18 @@ def softmax_weights(values, temperature):
 
 
 @ti.func
-def choose_softly(values, bits, explore_below, temperature):
-    """Return an action by the rule "softmax"; arguments are those of `choose`."""
+def choose_softly(a: ti.template(), values, bits, explore_below):
+    """Return the action of an ant `a` by the rule "softmax"; other arguments as in `choose`."""
     action = below(low_word(bits), N_ACTIONS)
     if not high_word(bits) < explore_below:
-        action = chosen_by(softmax_weights(values, temperature), N_ACTIONS, low_word(bits))
+        action = chosen_by(softmax_weights(values, a.temperature), N_ACTIONS, low_word(bits))
     return action
 
 
 @ti.func
-def chance_of_softly(values, action, explore_below, temperature):
+def chance_of_softly(a: ti.template(), values, action, explore_below):
     """Return the probability (f64) with which `choose_softly` returns this action."""
-    weights = softmax_weights(values, temperature)
+    weights = softmax_weights(values, a.temperature)
     total = ti.f64(0.0)
     for a in ti.static(range(N_ACTIONS)):
         total = total + weights[a]
@@ -155,9 +155,9 @@ def chance_of_softly(values, action, explore_below, temperature):
 
 
 @ti.func
-def attraction(level, k, exponent):
+def attraction(a: ti.template(), level):
     """Return the weight of an open cell by the rule "deneubourg": (k + level)^exponent, f64."""
-    return power(k + ti.cast(level, ti.f64), exponent)
+    return power(a.k + ti.cast(level, ti.f64), a.exponent)
 
 
 @ti.func
@@ -183,3 +183,9 @@ def choose_cell(carries, codes: ti.template(), is_open_at, is_nearer, weights, b
             chosen[i] = ti.select(considered[i] == 1, weights[i], ti.f64(0.0))
         action = LEFT + chosen_by(chosen, 3, word)
     return action
+
+
+# The rules that choose by action values, with their probabilities; the greedy one has own forms.
+BY_VALUES = {"softmax": (choose_softly, chance_of_softly)}
+# The rules that choose a cell by the levels ahead: its weight, and the choice.
+BY_LEVELS = {"deneubourg": (attraction, choose_cell)}

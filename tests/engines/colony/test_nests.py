@@ -10,6 +10,7 @@ from random_colonies import RandomColony, random_colony, with_nests
 
 from taichi_ants import AntsError, Colony, Life, Task, TrainingConfig, World
 from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.features.foods import HELD
 from taichi_ants.interventions import AddAnts, Place, RemoveAnts
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.protocol import At
@@ -67,12 +68,12 @@ def test_snapshots_have_nests_and_kinds():
         ants = {ant.number: ant for ant in plain.ants.values()}
         of_ants = [ants[number] for number in now.ant_numbers.tolist()]
         assert now.ant_nests.tolist() == [ant.nest for ant in of_ants]
-        carried = [ant.kind if ant.carries else -1 for ant in of_ants]
+        carried = [ant.own["kind"] if ant.carries else -1 for ant in of_ants]
         assert now.ant_foods.tolist() == carried
         seen.update(zip(now.ant_nests.tolist(), carried, strict=True))
-        for cell, kind in plain.world.kinds.items():
+        for cell, food in plain.world.of_cells.items():
             if plain.world.ground[cell] == FOOD:
-                kinds[colony.grid.index(cell)] = kind
+                kinds[colony.grid.index(cell)] = food["kind_of"]
         assert (now.food_kinds == kinds).all()
     assert now.queens.tolist() == [int(colony.grid.index(cell)) for cell in plain.world.queens]
     assert {(0, -1), (0, 0), (1, -1), (1, 0), (1, 1)} <= seen
@@ -80,9 +81,9 @@ def test_snapshots_have_nests_and_kinds():
 
 def loads_of(colony: Colony, world: int) -> np.ndarray:
     """The loads in cells and of living carriers, by kind."""
-    size, kinds = colony.grid.size, np.zeros(colony.n_kinds, int)
+    size, kinds = colony.grid.size, np.zeros(colony.model.n_kinds, int)
     here = np.flatnonzero(colony.snapshot(world).ground == FOOD) + world * size
-    loads = colony.arrays["loads"][here] if colony.task.has_loads else 1
+    loads = colony.arrays["loads"][here] if HELD.is_used(colony.task) else 1
     np.add.at(kinds, colony.arrays["kind_of"][here], loads)
     carries = colony.living[world] & (
         colony.arrays["carries"].reshape(colony.living.shape)[world] == 1

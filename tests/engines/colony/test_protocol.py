@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plain_interventions import Protocol
 from random_castes import drawn_castes
 from random_choices import NO_NOISE, NOISE
-from random_colonies import random_colony, with_nests
+from random_colonies import mortal, random_colony, with_nests
 from random_protocols import random_protocol
 from same_colonies import assert_equal
 
@@ -21,7 +22,6 @@ from taichi_ants.interventions import Place, RemoveAnts, from_dict
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.protocol import At, Every, When
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.interventions import Protocol
 from taichi_ants.task import foraging
 from taichi_ants.task.constants import BEST_AT, EMPTY, FOOD, OBSTACLE, ROW
 
@@ -68,7 +68,7 @@ def drawn_cases(kernel, seed, n_worlds):
         **dict(zip(("fields", "cues"), more, strict=False)),
     )
     if len(more) > 2:
-        drawn = with_nests(drawn, seed, *more[2])
+        drawn = with_nests(mortal(drawn), seed, *more[2])
     if kernel is WITH_CASTES:
         cues = [("trail", "a"), ("a", "compass")]
         drawn = (

@@ -154,7 +154,7 @@ def test_whole_trainings_of_a_mixed_sweep():
     names = list(learners.registry.BUILT_IN)
     for number, world in enumerate((paper(), random_world(13, 8))):
         task = drawn_task(number)
-        configs = [random_config(seed, names[seed % len(names)]) for seed in range(2 * len(names))]
+        configs = [random_config(number * len(names) + k, name) for k, name in enumerate(names)]
         # Only this one learns from an episode that is cut off.
         configs.append(TrainingConfig("n_step_sarsa", 0.37, 0.9, 0.3, 0.99, n_steps=3))
         result = train(world, configs, seeds=(-1, 2**63 + 5), episodes=4, max_steps=60, task=task)

@@ -1,14 +1,21 @@
-"""Further pheromones: their settings, and the occasions on which ants lay them."""
+"""Further pheromones: their settings, and the occasions on which ants lay them.
+
+Their levels and the trail are arrays of the engine, `engines/colony/trail.py`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntFlag
 from typing import Annotated, ClassVar, Literal
 
+from taichi_ants.features.castes import ALL, NOTHING
+from taichi_ants.features.cues import CUES
+from taichi_ants.features.feature import Feature, Task
+from taichi_ants.features.pheromone import Pheromone
 from taichi_ants.grid.constants import TRAIL as TRAIL
 from taichi_ants.settings import Setting
-from taichi_ants.task.pheromone import Pheromone
 
 Laid = Literal["with_food", "without_food", "always", "dead_end", "failed_pick_up", "never"]
 
@@ -73,3 +80,12 @@ class Field(Pheromone, path="task.fields.NAME"):
     def numbers(self) -> dict[str, int | float]:
         """The settings as numbers for kernels, by name."""
         return {**super().numbers, "deposited_when": int(OCCASIONS[self.deposited_when])}
+
+
+def _faults(task: Task) -> Iterator[str]:
+    for name in (TRAIL, *CUES, ALL, NOTHING):  # the last two have a meaning in `lays`
+        if name in task.fields:
+            yield f"`task.fields` has a field {name!r}, a name that is taken; choose another name."
+
+
+FIELDS = Feature(Field, uses=lambda task: bool(task.fields), faults=_faults)

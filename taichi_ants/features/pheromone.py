@@ -6,16 +6,15 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from taichi_ants.rules.built_in import WORDS
-from taichi_ants.rules.rule import Rule, registered, words
+from taichi_ants.features.rule import WORDS, Rule, registered, words
 from taichi_ants.settings import Setting, Settings, Share
-from taichi_ants.task.constants import DEPOSIT_LEVEL
 
 if TYPE_CHECKING:
     import numpy as np
 
 View = Literal["half", "strongest", "strongest_under_carriers"]
 DEPOSITS = WORDS["deposit"]
+DEPOSIT_LEVEL = 250
 MAX_DEPOSIT = 1_000_000
 LINEAR = -1.0  # marks linear evaporation in place of a decay factor
 

@@ -1,4 +1,4 @@
-"""The choice of actions, also by your own rule.
+"""The choice of actions.
 
 Every choice, every action that may slip and every cell that may be misread takes one draw. Its high
 word decides whether the ant explores, slips or misreads; its low word decides everything else.
@@ -6,20 +6,33 @@ word decides whether the ant explores, slips or misreads; its low word decides e
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.cues import sense
-from taichi_ants.reference.features import inputs_of
-from taichi_ants.reference.observations import AHEAD, cells_in_view, levels_in_view, ways
+from taichi_ants.reference.features.castes import caste_of
+from taichi_ants.reference.observations import cells_in_view, ways
 from taichi_ants.reference.random_stream import WORDS, RandomStream, pick
-from taichi_ants.reference.world_state import WorldState, computed
+from taichi_ants.reference.world_state import WorldState
 from taichi_ants.rules.functions import exp, power
 from taichi_ants.task import Choice, Task, Traffic
 from taichi_ants.task.constants import GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT, SEES_GOAL
+
+
+def choose(
+    world: WorldState, ant: Ant, task: Task, values: Sequence[np.float32], epsilon: float
+) -> int:
+    """Return the action of an ant by a built-in rule, with the numbers of its caste."""
+    choice, caste = task.choice, caste_of(task, ant)
+    for name in ("temperature", "k", "exponent"):
+        if (number := getattr(caste, name)) is not None:
+            choice = replace(choice, **{name: number})
+    if choice.rule == "deneubourg":
+        return choose_cell(world, ant, choice, task.traffic)
+    return choose_action(values, epsilon, ant.stream, choice)
 
 
 def choose_action(
@@ -77,33 +90,3 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
     best = [weights[side] if nearer[side] else 0.0 for side in range(3)]
     weights = best if any(best) else weights
     return weighted(weights, low)
-
-
-def choose_by_rule(
-    world: WorldState, ant: Ant, task: Task, values: Any, epsilon: float, tick: int
-) -> int:
-    """Return the action of an ant by your rule of choice; it draws once."""
-    rule = task.choice.own_rule
-    assert rule is not None
-    high, low = ant.stream.draw()
-    seen = ant.state if task.observation == "paper" else ant.paper_state
-    codes = [seen >> 4 & 3, seen >> 2 & 3, seen & 3]
-    is_open, nearer = ways(world, ant, codes, task.traffic)
-    inputs: dict[str, Any] = {"values": list(values), "codes": codes, "is_open": is_open}
-    inputs |= {"nearer": nearer, "paper_state": seen, "epsilon": int(epsilon * WORDS) / WORDS}
-    inputs |= {"random": low / WORDS, "random_2": high / WORDS}
-    inputs |= facts_of(world, ant, task, tick, ant.misread)
-    return int(computed(rule, task.rules, inputs))
-
-
-def facts_of(
-    world: WorldState, ant: Ant, task: Task, tick: int, hidden: Container[int]
-) -> dict[str, Any]:
-    """Return the inputs of all kinds of rules that ants follow; `hidden` turns show no levels."""
-    inputs: dict[str, Any] = {"carries": ant.carries, "trait": ant.trait, "tick": tick}
-    inputs |= inputs_of(world, ant, task)
-    named = {f"_{name}": trail for name, trail in world.pheromones.items()}
-    for name, trail in {"": world.cue(ant), **named}.items():
-        inputs[f"levels{name}"] = levels_in_view(world, ant, trail, AHEAD, hidden)
-        inputs[f"level{name}"] = trail.level(ant.cell)
-    return inputs

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from plain_measures import measured
+
 import taichi_ants.interventions as language
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_INTERVENTION
 from taichi_ants.protocol import At, Every, ProtocolEvent, When
@@ -13,7 +15,6 @@ from taichi_ants.reference.ants import Ant, start_order
 from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.features.castes import draw_caste
 from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells, normal_form
-from taichi_ants.reference.measures import measured
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
@@ -80,7 +81,7 @@ class Interventions:
                 names = list(self.colony.task.foods)
                 kind = names.index(change.kind) if change.kind else 0
                 what = OBSTACLE if change.what == "rock" else FOOD
-                self._put(cells, what, kind, world.full(kind))
+                self._put(cells, what, kind)
             case language.Clear():
                 self._put(cells, EMPTY)
             case language.Move():
@@ -108,7 +109,7 @@ class Interventions:
             return change.number
         return int(change.share * len(self._ants(change.nest)) + 0.5)
 
-    def _put(self, cells: Sequence[Cell], what: int, kind: int = 0, loads: int = 1) -> None:
+    def _put(self, cells: Sequence[Cell], what: int, kind: int = 0) -> None:
         """Make cells EMPTY, OBSTACLE or FOOD, except those of ants and queens."""
         world = self.colony.world
         self._move_aside(cells if what != EMPTY else ())
@@ -117,7 +118,7 @@ class Interventions:
                 continue
             world.ground[cell] = what
             if what == FOOD:
-                world.put_food(cell, kind, loads)
+                self.colony.fill(cell, kind)
                 self.colony.food_sources.put(cell, kind)
             else:
                 self.colony.food_sources.end(cell)
@@ -146,7 +147,9 @@ class Interventions:
             self._move_queen(to, world.queens.index(cell))
         elif to not in world.ants:
             self._put([cell], EMPTY)
-            self._put([to], what, world.kinds.get(cell, 0), world.loads.get(cell, 1))
+            food = world.of_cells[cell]
+            self._put([to], what, food.get("kind_of", 0))
+            world.of_cells[to] = food
 
     def _move_queen(self, cell: Cell, nest: int) -> None:
         """Move a queen to an empty cell; an ant there moves aside."""
@@ -235,4 +238,4 @@ class Protocol:
         if tick == 0 or tick % event.interval or (event.once and number in self._happened):
             return False
         value = measured(self._colony, event.measure)
-        return value > event.above if event.above is not None else value < event.below  # type: ignore[operator]
+        return value > event.above if event.above is not None else value < event.below
