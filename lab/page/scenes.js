@@ -81,7 +81,7 @@ export const QUESTIONS = [
   },
   {
     id: "bridge", title: "The double bridge", ticks: 2000, speed: 4,
-    ask: "Two ways. Which one will they take?", options: ["Most the short one", "About half each", "Most the long one"],
+    ask: "Two ways. Which one will they take?", options: ["Mostly the short one", "About half each", "Mostly the long one"],
     sub: "The way on the left is longer. No ant sees further than one cell, and none has seen both ways.",
     sides: [{ scene: { ...SCENE, world: WORLDS.findIndex(({ name }) => name === "bridge"), ants: 24 } }],
     answer: (results, [run]) => {
