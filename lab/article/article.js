@@ -7,7 +7,7 @@ import { many } from "../page/story.js";
 import { countOf, factOf, measured, PIECES, startOf } from "./pieces.js";
 
 // @ts-ignore: build.py declares it before all modules
-const MODULE = new WebAssembly.Module(Uint8Array.from(atob(BINARIES.COLONY_WASM), (c) => c.charCodeAt(0)));
+const COLONY = BINARIES.COLONY_WASM;
 const IN_VIEW = 0.3;       // of a world, from which it runs
 const MOST_TICKS_MS = 12;  // of a frame, for each world
 const FACT_MS = 100;       // between two numbers
@@ -52,7 +52,7 @@ class World {
   choose(option) {
     const { piece } = this, [value, name] = piece.options[option], { scene, events, skip } = startOf(piece, value);
     this.option = option;
-    const run = this.run = new Run(MODULE, scene, events);
+    const run = this.run = new Run(this.article.module, scene, events);
     run.skip(skip);
     this.begun = countOf(run.engine);
     this.end = skip + piece.ticks;
@@ -120,6 +120,8 @@ class World {
     const { piece, results, run } = this, live = results[this.option] ?? factOf(piece, run.engine, this.begun);
     const numbers = results.map((result, k) => (k === this.option ? live : result));
     const most = Math.max(1e-9, ...numbers.map((number) => number || 0), ...this.many.flat());
+    if (piece.points && results[this.option] === null)
+      this.figure.querySelector(".unit").textContent = `${piece.unit}; ${many(run.engine.returns - this.begun.returns)} points earned`;
     this.rows.forEach((row, k) => {
       const seeds = [...this.many[k]].sort((a, b) => a - b), at = (share) => seeds[Math.round(share * (seeds.length - 1))];
       const range = seeds.length === SEEDS, [bar, band] = row.querySelectorAll(".bar > *");
@@ -141,7 +143,7 @@ class World {
       button.textContent = `Seed ${seed} of ${SEEDS} …`;
       for (const [k, [value]] of piece.options.entries()) {
         await new Promise((done) => { setTimeout(done); });
-        this.many[k].push(measured(MODULE, piece, value, seed));
+        this.many[k].push(measured(this.article.module, piece, value, seed));
       }
     }
     button.textContent = `Medians of ${SEEDS} seeds; the band holds half of them`;
@@ -153,6 +155,7 @@ class World {
 class Article {
   constructor() {
     const calm = matchMedia("(prefers-reduced-motion: reduce)");
+    this.module = new WebAssembly.Module(Uint8Array.from(atob(COLONY), (c) => c.charCodeAt(0)));
     this.theme = /theme=light/.test(location.search) ? "light" : "dark";
     this.ui = { arrows: "", still: calm.matches, now: 0, hero: -1, ghost: null, pointer: null };
     this.sleeping = true;
@@ -206,4 +209,9 @@ class Article {
   }
 }
 
-Object.assign(window, { article: new Article() });
+try {
+  Object.assign(window, { article: new Article() });
+} catch (error) {
+  document.querySelector(".lead").insertAdjacentHTML("afterend", "<p>This browser cannot run the worlds below: they need WebAssembly with SIMD. The text can be read.</p>");
+  throw error;
+}

@@ -15,6 +15,7 @@ import { SCENE, WORLDS } from "../page/worlds.js";
  * @property {number} speed
  * @property {number} seed that is shown; its numbers are near the medians of 20
  * @property {number} [followed] the ant with a ring
+ * @property {boolean} [points] whether the reward is shown as well
  * @property {(value: number) => { scene: Partial<Scene>, events?: any[], skip?: number }} start `skip` ticks pass before anybody watches
  * @property {(engine: Engine, begun: Count) => number} [fact] by default the loads that were brought home
  */
@@ -82,7 +83,7 @@ export const PIECES = {
   },
   pay: {
     ask: "Pay for a step along the way", options: [[0, "nothing"], [1, "1 point"], [3, "3 points"], [10, "10 points"]], from: 3,
-    unit: "loads in 1 000 ticks", ticks: 1000, speed: 3, seed: 8,
+    unit: "loads in 1 000 ticks", ticks: 1000, speed: 3, seed: 8, points: true,
     start: (shaping) => ({ scene: { world: PAPER, rules: RULES.paper, level: 250, ants: 4, discount: 0.99, shaping }, skip: TRAINED }),
   },
 };
