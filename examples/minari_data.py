@@ -17,7 +17,7 @@ from minari.data_collector import EpisodeBuffer
 
 import taichi_ants
 from taichi_ants import Dataset, Task, World, offline, worlds
-from taichi_ants.envs.formats import ObservationFormat, Shown
+from taichi_ants.envs.formats import ObservationFormat, ShownObservations
 from taichi_ants.files import to_json
 from taichi_ants.offline.dataset import COLUMNS
 
@@ -27,7 +27,7 @@ INFOS = ("run", "agent", "step", "behaviour_probability")
 
 def to_minari(data: Dataset, name: str, form: ObservationFormat = "cells") -> minari.MinariDataset:
     """Return a data set written to Minari's local storage, for example as "ants/random-v0"."""
-    shown, buffers = Shown(data.task.sees, form), []
+    shown, buffers = ShownObservations(data.task.sees, form), []
     for first, end in zip(data.begins[:-1], data.begins[1:], strict=True):
         rows = slice(first, end)
         infos = {info: np.append(getattr(data, info)[rows], 0) for info in INFOS}
@@ -60,7 +60,7 @@ def from_minari(
     if "taichi_ants" in metadata:
         facts = json.loads(metadata["taichi_ants"])
         known, form = Dataset.described(facts), facts["format"]
-    shown, pieces = Shown(known["task"].sees, form).table, []
+    shown, pieces = ShownObservations(known["task"].sees, form).table, []
     state_of = {row.tobytes(): state for state, row in enumerate(shown)}
     for number, episode in enumerate(source.iterate_episodes()):
         rows, n = episode.observations.astype(shown.dtype), len(episode)

@@ -1,8 +1,8 @@
-"""Build docs/lab.html, the lab as a single file: python lab/build.py.
+"""Build the pages of the lab, each a single file in docs: python lab/build.py.
 
-The modules of lab/page are joined in the order of MODULES into one script: lines that import are
-dropped, and the word "export" is. So each module can also be imported as it is, by Node and by a
-type checker. Fonts and WebAssembly are embedded in base64; the page needs no network.
+The modules of a page are joined in the order given into one script: lines that import are dropped,
+and the word "export" is. So each module can also be imported as it is, by Node and by a type
+checker. Fonts and WebAssembly are embedded in base64; the pages need no network.
 """
 
 from __future__ import annotations
@@ -12,18 +12,52 @@ import json
 import re
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 LAB = Path(__file__).parent
-PAGE = LAB / "page"
-BUILT = LAB.parent / "docs" / "lab.html"
-MOST_BYTES = 400_000
-# In this order: each module uses only those before it while it is loaded.
-MODULES = (
-    *("worlds", "engine", "link", "geometry", "looks", "run", "story", "shapes", "draw", "plot"),
-    *("mind", "scenes", "daily", "brush", "controls", "train", "address", "film", "embed", "main"),
+DOCS = LAB.parent / "docs"
+
+
+class Page(NamedTuple):
+    """A page: its markup, styles and modules, the variables of its binaries, and its limit.
+
+    Each module uses only those before it while it is loaded.
+    """
+
+    markup: str
+    styles: tuple[str, ...]
+    modules: tuple[str, ...]
+    binaries: dict[str, str]
+    most_bytes: int
+
+
+_SHARED = ("worlds", "engine", "link", "geometry", "looks", "run", "story", "shapes", "draw")
+_LAB = (
+    *("plot", "mind", "scenes", "daily", "brush", "controls", "train", "address", "film"),
+    *("embed", "main"),
 )
-FONTS = (("Newsreader", "500", "newsreader.woff2"), ("Inter", "400 650", "inter.woff2"))
-BINARIES = {"COLONY_WASM": "colony.wasm", "ANT_WASM": "ant.wasm"}
+_COLONY = {"COLONY_WASM": "colony.wasm"}
+PAGES = {
+    "lab.html": Page(
+        "page/page.html",
+        ("page/base.css", "page/style.css"),
+        tuple(f"page/{name}.js" for name in (*_SHARED, *_LAB)),
+        {**_COLONY, "ANT_WASM": "ant.wasm"},
+        400_000,
+    ),
+    "article.html": Page(
+        "article/article.html",
+        ("page/base.css", "article/article.css"),
+        (
+            *(f"page/{name}.js" for name in (*_SHARED, "scenes")),
+            *(f"article/{name}.js" for name in ("pieces", "article")),
+        ),
+        _COLONY,
+        500_000,
+    ),
+}
+FONTS = LAB / "page" / "fonts"
+FACES = (("Newsreader", "500", "newsreader.woff2"), ("Inter", "400 650", "inter.woff2"))
 _IMPORT = re.compile(r"^import\b[^;]*;\n", re.M)
 _NAME = re.compile(r"^(?:async )?(?:const|let|function|class) (\w+)", re.M)
 
@@ -33,9 +67,9 @@ def base64_of(path: Path) -> str:
     return base64.b64encode(path.read_bytes()).decode()
 
 
-def script() -> str:
+def script(modules: tuple[str, ...]) -> str:
     """Return the modules as one script; raise ValueError if two of them declare the same name."""
-    parts = [_IMPORT.sub("", (PAGE / f"{name}.js").read_text("utf-8")) for name in MODULES]
+    parts = [_IMPORT.sub("", (LAB / name).read_text("utf-8")) for name in modules]
     text = re.sub(r"^export ", "", "\n".join(parts), flags=re.M)
     names = _NAME.findall(text)
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -44,26 +78,28 @@ def script() -> str:
     return text
 
 
-def page() -> str:
-    """Return the whole page; raise ValueError if it is larger than a visitor should wait for."""
+def page(name: str) -> str:
+    """Return a whole page; raise ValueError if it is larger than a visitor should wait for."""
+    one = PAGES[name]
     faces = "".join(
-        f'@font-face {{ font-family: "{name}"; font-weight: {weight}; font-display: swap; '
-        f'src: url(data:font/woff2;base64,{base64_of(PAGE / "fonts" / file)}) format("woff2"); }}\n'
-        for name, weight, file in FONTS
+        f'@font-face {{ font-family: "{family}"; font-weight: {weight}; font-display: swap; '
+        f'src: url(data:font/woff2;base64,{base64_of(FONTS / file)}) format("woff2"); }}\n'
+        for family, weight, file in FACES
     )
-    binaries = {name: base64_of(LAB / "engine" / file) for name, file in BINARIES.items()}
+    binaries = {key: base64_of(LAB / "engine" / file) for key, file in one.binaries.items()}
     parts = {
-        "STYLE": faces + (PAGE / "style.css").read_text("utf-8"),
-        "SCRIPT": f"const BINARIES = {json.dumps(binaries)};\n{script()}",
+        "STYLE": faces + "\n".join((LAB / style).read_text("utf-8") for style in one.styles),
+        "SCRIPT": f"const BINARIES = {json.dumps(binaries)};\n{script(one.modules)}",
     }
-    whole = (PAGE / "page.html").read_text("utf-8")
-    for name, text in parts.items():
-        whole = whole.replace(f"/* {name} */", text)
-    if (size := len(whole.encode())) > MOST_BYTES:
-        raise ValueError(f"the page has {size} bytes, at most {MOST_BYTES} are allowed")
+    whole = (LAB / one.markup).read_text("utf-8")
+    for key, text in parts.items():
+        whole = whole.replace(f"/* {key} */", text)
+    if (size := len(whole.encode())) > one.most_bytes:
+        raise ValueError(f"{name} has {size} bytes, at most {one.most_bytes} are allowed")
     return whole
 
 
 if __name__ == "__main__":
-    BUILT.write_text(page(), encoding="utf-8")
-    sys.stdout.write(f"{BUILT}: {len(page().encode()):,} bytes\n")
+    for name in PAGES:
+        (DOCS / name).write_text(page(name), encoding="utf-8")
+        sys.stdout.write(f"{DOCS / name}: {(DOCS / name).stat().st_size:,} bytes\n")

@@ -5,22 +5,22 @@ import { centre } from "./geometry.js";
 import { bold, many, seconds } from "./story.js";
 import { SCENE, WORLDS } from "./worlds.js";
 
-const NEVER = { ...SCENE, ants: 1, rules: RULES.paper, discount: 0.95, level: 250, seed: 16 };
+const PAID = { ...SCENE, world: WORLDS.findIndex(({ name }) => name === "paper"), ants: 4, rules: RULES.paper, discount: 0.99, level: 250, seed: 8 };
 const ALONE = { ...SCENE, ants: 1 };
 const HOMEWARD = { ...SCENE, rules: RULES.paper };
 const MIDDLE = { ...SCENE, seed: 88 };
-const stop = (tick) => [{ tick, do: "epsilon", value: 0 }, { tick, do: "learns", value: 0 }];
 
-/** A wall across the lanes of the meadow, as a path of cells: two cells up, one up and left, four times. */
-function wallPath() {
-  const R = WORLDS[0].radius, path = [[-3, 1]];
-  for (let k = 0; k < 12; k++) path.push([path[k][0] + (k % 3 < 2 ? 1 : 0), path[k][1] - (k % 3 < 2 ? 0 : 1)]);
-  return path.map(([q, r]) => (r + R) * (2 * R + 1) + q + R);
+/** A wall across the lanes of the meadow, as a path of cells: two cells up, one up and left, and so on. */
+export function wallPath(length = 13) {
+  const R = WORLDS[0].radius, path = [[0, 0]];
+  for (let k = 1; k < length; k++) path.push([path[k - 1][0] + (k % 3 ? 1 : 0), path[k - 1][1] - (k % 3 ? 0 : 1)]);
+  const [q0, r0] = path[length >> 1];
+  return path.map(([q, r]) => (r - r0 - 1 + R) * (2 * R + 1) + q - q0 + 1 + R);
 }
 const WALL = { tick: 600, do: "rock", reach: 1, path: wallPath() };
 
 /** How much of the traffic in the middle of the bridge takes the left, longer way. */
-function longShare({ engine }) {
+export function longShare({ engine }) {
   let long = 0, all = 0;
   for (let cell = 0; cell < engine.size; cell++) {
     const [x, y] = centre(engine.q(cell), engine.r(cell));
@@ -39,17 +39,17 @@ const more = (a, b) => `${(b ? a / b : a).toFixed(1)} times as much`;
  */
 export const QUESTIONS = [
   {
-    id: "never", title: "The ant that never delivers", ticks: 700, speed: 4,
-    ask: "Who brings home more?", options: ["The better paid ant", "The other one"],
-    sub: "Each ant learned alone for 20 000 ticks. Food at home pays 10 points. A step along scent, or with food nearer to the nest, "
-      + "pays the left ant 1 point and the right one 10.",
-    sides: [{ label: "1 point for a step", scene: NEVER, events: stop(20000), skip: 20000 },
-            { label: "10 points for a step", scene: { ...NEVER, shaping: 10 }, events: stop(20000), skip: 20000 }],
+    id: "never", title: "Paid for walking", ticks: 1000, speed: 4,
+    ask: "Who brings home more?", options: ["Those paid for each step", "Those paid for food alone"],
+    sub: "On both sides, four ants have learned for 20 000 ticks. Food at home pays 10 points. On the right, so does every step along "
+      + "scent, or with food nearer to the nest: a helpful hint.",
+    sides: [{ label: "paid for food alone", scene: { ...PAID, shaping: 0 }, skip: 20000 },
+            { label: "10 points for a step", scene: { ...PAID, shaping: 10 }, skip: 20000 }],
     answer: ([left, right]) => ({
       right: right.food > left.food ? 0 : 1,
-      head: right.food ? `It brought ${many(right.food)} loads.` : "It never delivers.",
-      sub: `It earned ${bold(many(right.points))} points on its way back and forth, the other ant ${bold(many(left.points))}, with `
-        + `${bold(many(left.food))} loads of food. It does what it is paid for, and not what was meant.`,
+      head: right.food > left.food ? "The hint helped." : "They walk for the sake of walking.",
+      sub: `${bold(many(right.food))} loads against ${bold(many(left.food))}, yet ${bold(many(right.points))} points against `
+        + `${bold(many(left.points))}. They do what they are paid for, and not what was meant.`,
     }),
   },
   {
@@ -80,7 +80,7 @@ export const QUESTIONS = [
   },
   {
     id: "bridge", title: "The double bridge", ticks: 2000, speed: 4,
-    ask: "Two ways. Which one will they take?", options: ["Most the short one", "About half each", "Most the long one"],
+    ask: "Two ways. Which one will they take?", options: ["Mostly the short one", "About half each", "Mostly the long one"],
     sub: "The way on the left is longer. No ant sees further than one cell, and none has seen both ways.",
     sides: [{ scene: { ...SCENE, world: WORLDS.findIndex(({ name }) => name === "bridge"), ants: 24 } }],
     answer: (results, [run]) => {

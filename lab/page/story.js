@@ -43,7 +43,7 @@ export function storyOf(run) {
   }
   const n = run.engine.ants;
   return { id: "start", head: n === 1 ? "This ant knows nothing." : `These ${many(n)} ants know nothing.`,
-           sub: `${n === 1 ? "It is" : "They are"} paid for food brought home. Nobody tells them where it is, or how.` };
+           sub: `${n === 1 ? "It is" : "They are"} paid for food brought home. Nobody tells them where to find it, or how.` };
 }
 
 function giftStory(run) {

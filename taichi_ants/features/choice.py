@@ -99,7 +99,7 @@ def _of_castes(name: str) -> Callable[[Task, Caste], float]:
     """Return a function of a number of a caste, by default that of the task; 0 is unused."""
 
     def of(task: Task, caste: Caste) -> float:
-        own = getattr(caste, name)
+        own = getattr(caste, name, None)  # castes do not have all of them
         return (getattr(task.choice, name) or 0.0) if own is None else own
 
     return of
@@ -128,7 +128,7 @@ def _faults(task: Task) -> Iterator[str]:
     unused += [name for name, rules in _OF_RULES.items() if choice.rule not in rules]
     for name, caste in task.castes.items():
         for setting in unused:
-            if getattr(caste, setting) is not None:
+            if getattr(caste, setting, None) is not None:
                 yield (
                     f"`task.castes.{name}.{setting}` is {shown(getattr(caste, setting))}; leave it "
                     f"out, because `task.choice.rule` is {choice.rule!r}."

@@ -132,11 +132,11 @@ PAID = Feature(Food, uses=lambda task: bool(task.foods), paid=_paid)
 @PAID.at("pays")
 def pay(a, event, reward):
     """Pay for food by its kind."""
-    kind = ti.cast(a.kind, ti.i32)
-    if event == _PICKED_UP:
+    if (event == _PICKED_UP) | (event == _DELIVERED):
+        kind = ti.cast(a.kind, ti.i32)
         reward = a.food_numbers[_PICK_UP, kind]
-    if event == _DELIVERED:
-        reward = a.food_numbers[_DELIVER, kind]
+        if event == _DELIVERED:
+            reward = a.food_numbers[_DELIVER, kind]
     return reward
 
 

@@ -15,6 +15,8 @@ from lab_engines import ENGINE
 from taichi_ants import AntsError, lab
 from taichi_ants.worlds.lab import WORLDS, lab_world
 
+CODE = "AQAPVUAeZIQHAQrYBAEC"  # of the first screen
+AT_ONCE = [{"tick": 5, "do": "rock", "reach": 1, "path": [cell]} for cell in (2112, 2113)]
 THOUSANDTHS = ("epsilon", "rate", "discount")
 
 
@@ -63,6 +65,7 @@ def visits(draw):
     return scene, events
 
 
+@example(({**lab.decoded(CODE)[0], "learner": 0}, AT_ONCE))
 @given(visits())
 def test_a_code_has_the_visit(ask, visit):
     scene, events = visit
@@ -75,9 +78,6 @@ def test_a_code_has_the_visit(ask, visit):
         cells = [(r + radius) * (2 * radius + 1) + q + radius for q, r in event.path]
         more = {"reach": event.reach, "path": cells} if cells else {"value": event.value}
         assert {"tick": event.tick, "do": event.does, **more} == wanted
-
-
-CODE = "AQAPVUAeZIQHAQrYBAEC"  # of the first screen
 
 
 @example(b"")

@@ -20,13 +20,15 @@ QUESTIONS = ("never", "copies", "home", "bridge", "wall", "halves")
 SIZES = {"phone": (390, 844), "tablet": (1024, 768), "desk": (1440, 900)}
 
 
-def test_the_committed_page_is_built_from_the_modules():
+@pytest.mark.parametrize("name", ["lab.html", "article.html"])
+def test_the_committed_page_is_built_from_the_modules(name):
     spec = importlib.util.spec_from_file_location("build_lab", ROOT / "lab" / "build.py")
     build = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(build)
-    assert FILE.read_text(encoding="utf-8") == build.page(), "run python lab/build.py"
-    assert FILE.stat().st_size < 400_000
-    text = re.sub(r"base64,[\w+/=]+", "", FILE.read_text(encoding="utf-8"))
+    text = FILE.with_name(name).read_text(encoding="utf-8")
+    assert text == build.page(name), "run python lab/build.py"
+    assert len(text) < 400_000
+    text = re.sub(r"base64,[\w+/=]+", "", text)
     assert set(re.findall(r"https?://[\w.]+", text)) == {"http://www.w3.org"}  # a namespace
 
 
@@ -270,7 +272,7 @@ def test_a_question_waits_for_a_prediction_and_answers_by_what_it_measures(opene
     replayed = opened("#" + page.link())  # the same states in a page that only has the link
     assert replayed.read("lab.address.replayed.equal")
     expected = {
-        "never": lambda f: f[0] > 5 > f[1] == 0,
+        "never": lambda f: f[0] > 2 * f[1],
         "copies": lambda f: f[1] < 0.5 * f[0],
         "home": lambda f: f[1] > 2 * f[0],
         "wall": lambda f: f[0] > 1.5 * f[1],

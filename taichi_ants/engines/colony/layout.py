@@ -179,7 +179,7 @@ ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food
 _LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
 SORTED_BITS = 16  # of the number of a cell, by which ants are sorted
 TOUCHED_LINE = 32  # numbers that fill two cache lines, see `LINE`
-# The most sums of TD errors of all chunks, if the tables are large: 28 bytes each.
+# The most sums of TD errors of all chunks, if the tables are large: 24 bytes each.
 _MOST_SUMS = 2**22
 
 
