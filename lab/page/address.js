@@ -15,7 +15,7 @@ export const visitOf = (runs) => runs.map((run) => linkOf(run.engine)).join("~")
 const withoutMoment = (runs) => runs.map(({ engine }) => encode(engine.first, engine.events)).join("~");
 
 function show(text) {
-  try { history.replaceState(null, "", `#${text}`); } catch { /* a frame without an address of its own */ }
+  try { history.replaceState(null, "", `#${text}`); } catch { /* a frame that has no address */ }
 }
 
 /** Copy a text; return whether the browser allowed it. Pages in frames and files often need the old way. */
@@ -90,7 +90,7 @@ export class Address {
       });
     } catch (error) {
       lab.begin();
-      lab.toast(error instanceof URIError ? DAMAGED : error.message, 6000);
+      lab.toast(error.name === "URIError" ? DAMAGED : error.message, 6000);
       return true;
     }
     lab.begin(starts);

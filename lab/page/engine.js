@@ -11,7 +11,7 @@
  *   engine.apply(event)   a change between two ticks, which is recorded in `engine.events`:
  *     { do: "rock" | "food" | "scent" | "erase", reach: 0..7, path: [cells] }
  *       a stroke: all cells within `reach` of a path of adjacent cells. While a visitor draws, apply
- *       the new cells of each frame as an event of its own, without the last cell of the one before
+ *       the new cells of each frame as a separate event, without the last cell of the one before
  *       (a link then writes them as one stroke). Cells outside the world are dropped.
  *     { do: "ants" | "epsilon" | "rate" | "discount" | "level" | "shaping" | "learns", value }
  *       `level` is how long new scent lasts, in ticks; `learns` is 0 or 1. Values are rounded to

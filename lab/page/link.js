@@ -13,7 +13,7 @@
  *     4 | setting << 3 for a setting, and its value
  *
  * Numbers marked * can be negative: n is written as 2 n, or -2 n - 1. Each part of a stroke between
- * waits is an event, which paints all cells within `reach` of its own cells.
+ * waits is an event, which paints all cells within `reach` of its path.
  */
 import { LIMITS, SIGNED, STEPS, THOUSANDTHS, hexDistance, leastOf } from "./engine.js";
 import { WORLDS } from "./worlds.js";
