@@ -106,7 +106,7 @@ def page(name: str) -> str:
 
 def live_page() -> str:
     """Return the live page of the package with a worker in place of the server."""
-    controls, style, socket, *scripts = (part(name, "taichi_ants.live") for name in PARTS)
+    controls, style, _socket, *scripts = (part(name, "taichi_ants.live") for name in PARTS)
     worker = script((*(f"page/{name}.js" for name in _ENGINE), "live/worker.js"))
     headers = (LAB / "live" / "headers.json").read_text("utf-8").strip()
     constants = {

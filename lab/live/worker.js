@@ -50,7 +50,10 @@ export class LiveColony {
     Object.assign(this, { module, headers, scene, post, playing: false, speed: 12, sessions: 0, inFlight: 0, behind: false });
     this.start(events);
     this.sendBegin();
-    while (this.engine.tick < (Number(tick) || 0)) this.advance(1); // the page can look back at all of it
+    while (this.engine.tick < (Number(tick) || 0)) { // the page can look back at all of it
+      this.advance(1);
+      this.inFlight = 1;
+    }
     this.sendState();
   }
 
@@ -106,7 +109,7 @@ export class LiveColony {
   }
 
   show(frame) {
-    this.behind ||= this.playing && this.inFlight >= MOST_IN_FLIGHT;
+    this.behind ||= this.inFlight >= MOST_IN_FLIGHT;
     if (this.behind) return;
     this.inFlight++;
     this.post(frame);
@@ -154,17 +157,17 @@ export class LiveColony {
 
   /** The header of `Recorder.header` in taichi_ants/viewer/recorder.py. */
   header() {
-    const { headers, scene, engine: { radius, size } } = this, header = headers.rules[scene.rules], learns = scene.learner !== LEARNERS.frozen;
+    const { headers, scene, engine: { radius, size } } = this, { observation, ...header } = headers.rules[scene.rules], learns = scene.learner !== LEARNERS.frozen;
     let count = 0;
     for (let q = -radius; q <= radius; q++) for (let r = -radius; r <= radius; r++) count += Number(hexDistance(q, r) < radius);
     const cell = size < 2 ** 16 ? "u2" : "u4", types = Object.entries(header.types).map(([name, type]) => [name, type === "cell" ? cell : type]);
     const numbers = { "learning rate": scene.rate, discount: scene.discount }, about = {
-      world: `${count} cells, ranges ${radius}, ${radius}, ${radius}`, "ants at the start": scene.ants, seed: scene.seed, observation: header.observation,
+      world: `${count} cells, ranges ${radius}, ${radius}, ${radius}`, "ants at the start": scene.ants, seed: scene.seed, observation,
       ...(learns ? { learner: LEARNER_LABELS[scene.learner], table: "shared", ...numbers } : { policy: "frozen", epsilon: scene.epsilon }),
     };
     return {
       ...header, title: `Ants in a world of ${count} cells`, ranges: [radius, radius, radius], types: Object.fromEntries(types), learns, names: headers.names[header.n_states],
-      groups: header.groups.map((group) => ({ ...group, learns })), about: Object.entries(about).map(([name, value]) => [name, String(value)]),
+      pheromones: header.pheromones.map((one) => ({ ...one, strongest: scene.level })), groups: header.groups.map((group) => ({ ...group, learns })), about: Object.entries(about).map(([name, value]) => [name, String(value)]),
     };
   }
 
