@@ -1,17 +1,16 @@
-"""The Python of docs/environments.md works, from top to bottom; its numbers are the package's."""
+"""The Python of docs/how-to/train_an_agent.md works; its numbers are the package's."""
 
 from __future__ import annotations
 
 import pytest
-from command_lines import ROOT
+from guides import blocks
 
 
 @pytest.mark.slow
 def test_the_guides_examples_work(capsys):
-    guide = (ROOT / "docs" / "environments.md").read_text("utf-8")
-    code = "\n".join(part.split("```")[0] for part in guide.split("```python\n")[1:])
     names: dict = {}
-    exec(compile(code, "environments.md", "exec"), names)
+    code = "\n".join(blocks("how-to/train_an_agent")[:7])
+    exec(compile(code, "train_an_agent.md", "exec"), names)
     assert capsys.readouterr().out.splitlines()[:5] == [
         "3 [1 1 1 0 0] 0",
         "0.9: return 45, 1 deliveries",
@@ -24,9 +23,9 @@ def test_the_guides_examples_work(capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["offline", "examples"])
-def test_the_first_block_of_a_page_needs_nothing_else(page, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("page", "heading"), [("offline", ""), ("train_an_agent", "Use the example agents")]
+)
+def test_the_first_block_needs_nothing_else(page, heading, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
-    code = text.split("```python\n")[1].split("```")[0]
-    exec(compile(code, f"{page}.md", "exec"), {})
+    exec(compile(blocks(f"how-to/{page}", heading)[0], f"{page}.md", "exec"), {})
