@@ -6,14 +6,15 @@ import re
 
 from command_lines import ROOT
 
+BLOCK = re.compile(r"^```(?P<language>\w*)\n(?P<code>.*?)^```$", re.M | re.S)
+
 
 def section(page: str, heading: str = "") -> str:
     """The text of a page such as "how-to/worlds", or of one of its sections."""
     text = (ROOT / f"docs/{page}.md").read_text("utf-8")
     if not heading:
         return text
-    code = re.compile(r"^```.*?^```", re.M | re.S)
-    prose = code.sub(lambda block: re.sub("#", "_", block[0]), text)  # comments are not headings
+    prose = BLOCK.sub(lambda block: block[0].replace("#", "_"), text)  # comments are no headings
     start = re.search(rf"^(#+) {re.escape(heading)}\n", prose, re.M)
     end = re.compile(rf"^#{{1,{len(start[1])}}} |\Z", re.M).search(prose, start.end())
     return text[start.end() : end.start()]
@@ -21,4 +22,5 @@ def section(page: str, heading: str = "") -> str:
 
 def blocks(page: str, heading: str = "", language: str = "python") -> list[str]:
     """The blocks of code in a language of a page, or of one of its sections."""
-    return re.findall(rf"^```{language}\n(.*?)^```", section(page, heading), re.M | re.S)
+    found = BLOCK.finditer(section(page, heading))
+    return [block["code"] for block in found if block["language"] == language]
