@@ -2,7 +2,7 @@
 
 The script trains ants with each learner and combination of hyperparameters (or others), compares
 the results with the paper and with exact bounds, and writes tables, figures and policies to a
-folder. See docs/paper.md.
+folder. See docs/results/paper.md.
 """
 
 from __future__ import annotations
