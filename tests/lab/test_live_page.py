@@ -41,7 +41,7 @@ def test_a_visit_can_be_looked_back_at_continued_and_saved(tmp_path):
         tab.on("pageerror", lambda error: faults.append(str(error)))
         tab.on("console", lambda message: faults.append(message.text))
         tab.goto(f"{FILE.as_uri()}#{VISIT};{TICK};0")
-        until(tab, f"() => viewer?.history.frames.at(-1).ticks === {TICK}")
+        until(tab, f"() => window.viewer?.history.frames.at(-1).ticks === {TICK}")
         colony = lab.played(*lab.decoded(VISIT), TICK)
         tick, cells, loaded, ground, trail = tab.evaluate(WORLD)
         snapshot = colony.snapshot()
@@ -83,6 +83,6 @@ def test_a_visit_can_be_looked_back_at_continued_and_saved(tmp_path):
             tab.click("[data-export=page]")
         saved.value.save_as(tmp_path / "recording.html")
         tab.goto((tmp_path / "recording.html").as_uri())
-        until(tab, "() => viewer?.history.length === 2")
+        until(tab, "() => window.viewer?.history.length === 2")
         context.close()
         assert faults == []
