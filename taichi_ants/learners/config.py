@@ -41,7 +41,7 @@ class TrainingConfig(Settings, path="training"):
 
     learner: Annotated[
         str,
-        Setting("name of the learner, such as sarsa or q_learning; see docs/learners_reference.md"),
+        Setting("name of the learner, such as sarsa or q_learning; see docs/reference/learners.md"),
     ]
     # Smaller step sizes could underflow to zero in float32.
     learning_rate: Annotated[
