@@ -7,6 +7,7 @@ import re
 import sys
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlparse
 from xml.sax.saxutils import escape
 
 import tomllib
@@ -37,7 +38,7 @@ default_role = "py:obj"
 
 # Pages. Notebooks hold their results, so that building the site runs nothing.
 nb_execution_mode = "off"
-myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "colon_fence", "dollarmath"]
 myst_heading_anchors = 4
 myst_update_mathjax = False
 html_math_renderer = "mathml"
@@ -48,18 +49,14 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sphinx = False
 html_copy_source = False
-html_theme_options = {
-    "source_repository": URLS.get("Repository", ""),
-    "source_branch": "main",
-    "source_directory": "docs/",
-}
-if not URLS:
-    html_theme_options = {}
+if "Repository" in URLS:
+    html_theme_options = {"source_repository": URLS["Repository"], "source_branch": "main"}
+    html_theme_options["source_directory"] = "docs/"
 # Where the site is; sitemaps and cards need it. Without an address, that of a local server.
 html_baseurl = os.environ.get("DOCS_URL", URLS.get("Documentation", "http://localhost:8000/"))
 APPS = ("lab.html", "article.html")  # pages that are complete, and not Sphinx's
 html_extra_path = list(APPS)
-notfound_urls_prefix = "/" if "localhost" in html_baseurl else None
+notfound_urls_prefix = urlparse(html_baseurl).path
 
 ogp_site_url = html_baseurl
 ogp_image = "_static/card.png"
