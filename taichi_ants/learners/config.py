@@ -65,8 +65,10 @@ class TrainingConfig(Settings, path="training"):
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
 
-    def __new__(cls, *values: Any, **named: Any) -> TrainingConfig:
-        return object.__new__(cls)  # further names are hyperparameters
+    if not TYPE_CHECKING:
+
+        def __new__(cls, *values: Any, **named: Any) -> TrainingConfig:
+            return object.__new__(cls)  # further names are hyperparameters
 
     def __init__(
         self,
