@@ -307,7 +307,6 @@ class Settings:
             cls.__doc__ = _Documentation(cls.__doc__)  # type: ignore[assignment]
 
     if not TYPE_CHECKING:  # type checkers and editors read the fields
-
         __signature__ = _Signature()
 
         def __new__(cls, /, *values: Any, **named: Any) -> Any:
