@@ -193,7 +193,7 @@ def test_the_internal_order_of_the_ants_does_not_matter():
         plain.tick()
         shuffled.tick()
     back = np.argsort(shuffled.numbers[0])
-    for name in plain.columns():
+    for name in plain._columns():
         assert np.array_equal(shuffled.arrays[name][back], plain.arrays[name]), name
     assert np.array_equal(shuffled.arrays["q"], plain.arrays["q"])
     assert np.array_equal(shuffled.arrays["ground"], plain.arrays["ground"])
