@@ -83,7 +83,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     planning = "planning updates after each step, to combine for learners that plan, such as dyna_q"
     add("--planning-steps", **several, default=(3, 5), help=planning)
     add("--world", default="paper", metavar="WORLD", help=command_line.WORLDS)
-    quick = f"use at most {QUICK_SEEDS} seeds: a first look at the results, whose intervals are wide"
+    quick = (
+        f"use at most {QUICK_SEEDS} seeds: a first look at the results, whose intervals are wide"
+    )
     command_line.add_study(parser, "compare", quick)
     parser.open_settings, parser.own_settings = ("world", "training"), _FIXED
     command_line.add_settings(parser, Task())
