@@ -150,10 +150,7 @@ def command(name: str) -> str:
                 lines.append([f"`{words}`", formatter._expand_help(action) if action.help else ""])
         about = " ".join((parser.description or "").split())
         head = f"### `{parser.prog}`\n\n" if kinds else ""
-        what = table(
-            ("Option", "Meaning"),
-            ([a.replace("|", "\\|"), b.replace("|", "\\|")] for a, b in lines),
-        )
+        what = table(("Option", "Meaning"), ([a.replace("|", "\\|"), b.replace("|", "\\|")] for a, b in lines))
         parts.append(f"{head}{about}\n\n```\n{usage.removeprefix('usage: ')}\n```\n\n{what}{more}")
     return "\n\n".join(parts)
 
@@ -222,7 +219,9 @@ def api(module: str) -> str:
 
 def pages() -> dict[Path, str]:
     """Return the text of each generated page, and of each page with generated parts."""
-    made = {REFERENCE / "api" / f"{module or 'taichi_ants'}.md": api(module) for module in MODULES}
+    made = {
+        REFERENCE / "api" / f"{module or 'taichi_ants'}.md": api(module) for module in MODULES
+    }
     for path in sorted(REFERENCE.glob("*.md")):
         text = path.read_text("utf-8")
         if _BLOCK.search(text):
