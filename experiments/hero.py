@@ -30,11 +30,14 @@ PAGE, SHOWN = (1200, 750), (960, 600)  # pixels: the window, and its picture
 FPS, QUALITY = 20, 54
 PAUSE, STROKE, AFTER = 60, 24, 180  # ticks from lanes to the wall, of its stroke, after the detour
 LONGEST = 1500  # ticks after which a colony counts as one that found no detour
-COURSE = """
+COURSE = (
+    f"globalThis.PAUSE = {PAUSE}, globalThis.STROKE = {STROKE}, globalThis.LONGEST = {LONGEST};"
+)
+COURSE += """
 // Pass a tick of a run, and draw the next piece of its wall.
 globalThis.pass = (run, act) => {
   const { lanes } = run.facts, { engine } = run;
-  const drawn = lanes < 0 ? -1 : run.tick - lanes - %(pause)d;
+  const drawn = lanes < 0 ? -1 : run.tick - lanes - PAUSE;
   if (drawn === 0) {
     const cells = run.suggestion().map(([x, y]) => {
       const r = Math.round(x / 1.5);
@@ -42,8 +45,8 @@ globalThis.pass = (run, act) => {
     });
     run.stroke = engine.line(...cells);
   }
-  if (drawn >= 0 && drawn < %(stroke)d) {
-    const at = (n) => Math.floor(n * run.stroke.length / %(stroke)d);
+  if (drawn >= 0 && drawn < STROKE) {
+    const at = (n) => Math.floor(n * run.stroke.length / STROKE);
     const path = run.stroke.slice(at(drawn), at(drawn + 1));
     if (path.length) act({ do: "rock", reach: 1, path });
   }
@@ -51,10 +54,10 @@ globalThis.pass = (run, act) => {
 };
 globalThis.timesOf = (seed) => {
   const run = new Run(lab.module, { ...SCENE, seed }), end = () => run.wall?.detour ?? -1;
-  while (end() < 0 && run.tick < %(longest)d) pass(run, (event) => run.apply(event));
-  return [run.facts.firstHome, run.facts.lanes, end() < 0 ? %(longest)d : end() - run.wall.last];
+  while (end() < 0 && run.tick < LONGEST) pass(run, (event) => run.apply(event));
+  return [run.facts.firstHome, run.facts.lanes, end() < 0 ? LONGEST : end() - run.wall.last];
 };
-""" % {"pause": PAUSE, "stroke": STROKE, "longest": LONGEST}
+"""
 START = """(seed) => {
   window.requestAnimationFrame = () => 0; // time passes by `show`
   lab.begin([{ scene: { ...SCENE, seed } }]);
@@ -67,13 +70,13 @@ SHOW = """([tick, now]) => {
     const cell = event.path[event.path.length - 1];
     ui.pointer = [run.engine.q(cell), run.engine.r(cell)];
   });
-  const drawn = run.tick - run.facts.lanes - %(pause)d;
-  ui.down = run.facts.lanes >= 0 && drawn >= 0 && drawn < %(stroke)d + 1;
+  const drawn = run.tick - run.facts.lanes - PAUSE;
+  ui.down = run.facts.lanes >= 0 && drawn >= 0 && drawn < STROKE + 1;
   if (!ui.down) ui.pointer = null;
   [ui.playing, lab.owed] = [false, tick - Math.floor(tick) || 1];
   lab.frame(now);
   lab.words();
-}""" % {"pause": PAUSE, "stroke": STROKE}
+}"""
 STILL = "* { animation: none !important; transition: none !important; }"
 
 
