@@ -299,9 +299,8 @@ export const GRID = [["q_learning", 0], ["sarsa", 0], ["dyna_q", 3], ["dyna_q", 
     [0.3, 0.5].flatMap((epsilon) => [0.99, 0.995].map((decay) =>
       ({ learner, planningSteps, truncates, rate, discount, epsilon, decay })))))));
 
-// What is noted of a step. Cell and heading are those after it, and the value is that of the entry which the step has changed.
-
 export class LoneAnts { // complete in itself, because workers get its text
+  /** What is noted of a step. Cell and heading are those after it, and the value is that of the entry which the step has changed. */
   static NOTES = ["episode", "step", "state", "action", "reward", "next", "terminated", "cell", "heading", "value"];
 
   /** @param {WebAssembly.Module} module ant.wasm */
