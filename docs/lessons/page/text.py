@@ -78,8 +78,11 @@ def markdown(text: str) -> str:
 
 def recorded(cell: dict[str, Any]) -> str:
     """Return the saved result of a cell: its text, and for a picture its description."""
-    texts = [f"<pre>{html.escape(''.join(out['text']))}</pre>" for out in cell["outputs"]
-             if "text" in out]
+    texts = [
+        f"<pre>{html.escape(''.join(out['text']))}</pre>"
+        for out in cell["outputs"]
+        if "text" in out
+    ]
     if "alt" in cell["metadata"]:
         texts.append(f"<p>{inline(cell['metadata']['alt'])}</p>")
     return f'<div class="recorded">{"".join(texts)}</div>' if texts else ""
@@ -114,7 +117,9 @@ def lesson(path: Path) -> str:
             solutions = 1
         elif solutions:
             parts.append("</details>" * (solutions > 1))
-            parts.append(f"<details><summary><b>Solution {solutions}</b></summary>{markdown(source)}")
+            parts.append(
+                f"<details><summary><b>Solution {solutions}</b></summary>{markdown(source)}"
+            )
             solutions += 1
         else:
             parts.append(markdown(source))
@@ -122,7 +127,7 @@ def lesson(path: Path) -> str:
             parts.append(f'<aside class="teachers"><b>For teachers.</b> {inline(note)}</aside>')
         parts += [piece(name, cell) for name in names]
     link = f'<a href="lessons/{path.name}">notebook in Python</a>'
-    parts.append(f"</details><p class=\"aside\">The same lesson is a {link}.</p>")
+    parts.append(f'</details><p class="aside">The same lesson is a {link}.</p>')
     return f'<article id="{path.stem[0]}">' + "\n".join(parts) + "</article>\n"
 
 
