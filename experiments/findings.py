@@ -67,7 +67,7 @@ def winners(results: Path) -> np.ndarray:
 
 
 def deliveries() -> dict[str, tuple[int, int]]:
-    """Return deliveries in the paper's world by rules: learned, and with a policy by hand."""
+    """Return deliveries in the paper's world by rules: learned, and by the hand-written policy."""
     page = (ROOT / "docs" / "results" / "foraging.md").read_text("utf-8")
     found = re.findall(r"\| (.+): learned \| (\d+) .*\n\| fixed \| (\d+) ", page)
     return {rules: (int(learned), int(fixed)) for rules, learned, fixed in found}
