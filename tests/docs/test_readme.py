@@ -42,7 +42,7 @@ def anchors(text: str) -> set[str]:
 
 def test_links_and_pictures_are_there():
     links = re.findall(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)", README)
-    assert len(links) > 20
+    assert len(links) > 15
     for path, anchor in links:
         assert (ROOT / path).exists(), path
         assert not anchor or anchor in anchors((ROOT / path).read_text("utf-8")), anchor
@@ -60,7 +60,7 @@ def test_the_third_finding_is_the_table_of_the_guide():
     learned, fixed = zip(*by_rules.values(), strict=True)
     assert f"deliver {learned[0]} food items in 1000 ticks" in WORDS
     assert f"they deliver {learned[1]}, and with rules for queues {learned[2]}" in WORDS
-    assert f"by hand gain as much: {fixed[0]}, {fixed[1]} and {fixed[2]}" in WORDS
+    assert f"Hand-written policies gain as much: {fixed[0]}, {fixed[1]} and {fixed[2]}" in WORDS
     pairs = [f"{one} and {other}" for one, other in by_rules.values()]
     assert f"paper's rules {pairs[0]}, three rules {pairs[1]}, queues {pairs[2]}" in WORDS
 
