@@ -154,7 +154,8 @@ def measure(seeds: list[int]) -> model_script.ScriptResults:
                 one = {"half_life": half_life, "model": name, "seed": seed}
                 for step, n in enumerate(of_seed, start=1):
                     numbers.append({**one, "tick": step * STEP, "delivered": n})
-                row = {"half-life, model": f"{half_life:g} {name}", "deliveries": of_seed[-1]}
+                case = f"{name}, {half_life:g} ticks"
+                row = {"repellent, half-life of the path": case, "deliveries": of_seed[-1]}
                 summary.append({**row, "difference": of_seed[-1] - base})
 
     def draw(axes):
