@@ -104,7 +104,7 @@ def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) ->
         "random": arrays["streams"].copy(),
         "q": arrays["q"].copy(),
         "weights": arrays["weights"][np.minimum(np.arange(colony.ants + 1), last)],
-        "rewards": np.array(astuple(colony.task.rewards), np.int32),
+        "rewards": np.array([*astuple(colony.task.rewards), 0], np.int32),
     }
     names = ("evaporates", "slope", "fades_after", "discount")
     in_c = CColony(
