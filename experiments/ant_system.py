@@ -15,7 +15,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import Annotated, Literal, get_args
 
     import numpy as np
-    import pages
+    import published
     import taichi as ti
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
@@ -291,7 +291,7 @@ def print_table(settings: argparse.Namespace) -> None:
         for (name, world), method in product(maps.items(), METHODS):
             rows.append([name, method, *row(settings, world, method)])
             progress(len(rows) / (len(maps) * len(METHODS)))
-    pages.show("ant_system", [Table("", COLUMNS, rows, text_columns=2)], settings.publish)
+    published.show("ant_system", [Table("", COLUMNS, rows, text_columns=2)], settings.publish)
 
 
 def row(settings: argparse.Namespace, world: World, method: Method) -> list[str]:

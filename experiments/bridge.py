@@ -19,7 +19,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     import bridge_report as shown
     import numpy as np
-    import pages
+    import published
     from bridge_report import BRIDGES, CASES, LATE, LOADS, WINDOWS, Case, bridges
     from colony import LEARNING, scheduled
 
@@ -149,7 +149,7 @@ def tables(plan: Plan, results: Results) -> str:
         shown.draw_late(folder / "late.png", found, plan.ticks)
     report = shown.tables(found, plan.ticks)
     for name, one in report.items():
-        pages.write(results.folder / "tables" / f"bridge_{name}.json", [one])
+        published.write(results.folder / "tables" / f"bridge_{name}.json", [one])
     return plain_text(list(report.values()), 120)
 
 

@@ -23,7 +23,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import Any
 
     import numpy as np
-    import pages
+    import published
     from paper import baselines as bounds
     from paper import figures, page, process
     from paper.claims import ON_PAGE, assess, claims_rows, headlines, verdict_table
@@ -254,14 +254,14 @@ def tables(plan: Plan, results: Results) -> str:
     facts = {"World": comparison.world, **setting_facts(settings_of(study.points, study.seeds))}
     links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
     facts |= made_facts(results.made)
-    titles = "return", "steps", "late_steps", "deliveries"
+    titles = "return", "steps", "late_steps"
     for name, table in {
         **dict(zip(titles, figure_tables(lines, comparison), strict=False)),
         "policies": behaviour_table(lines, summarise_behaviours(comparison)),
         "claims": headlines(audit, ON_PAGE),
         "verdicts": verdict_table(audit),
     }.items():
-        pages.write(folder / "tables" / f"paper_{name}.json", [table])
+        published.write(folder / "tables" / f"paper_{name}.json", [table])
     html = page.comparison_page(comparison, baselines, lines, audit, shown, facts, links)
     files.write_text(folder / PAGE, html)
     return report(comparison, lines, audit)

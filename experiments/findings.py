@@ -18,7 +18,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import compare
     import matplotlib
     import numpy as np
-    import pages
+    import published
     from matplotlib.figure import Figure
 
     from taichi_ants.analysis.behaviour import CIRCLES, WALKS
@@ -72,7 +72,7 @@ def deliveries() -> dict[str, tuple[int, ...]]:
     """Return deliveries in the paper's world by rules: learned, and with a policy by hand."""
     place, hands = "fixed_rules; the paper's world", ("learned", "by hand")
     return {
-        rules: tuple(int(pages.cell(f"{place}; {rules}; {one}")) for one in hands)
+        rules: tuple(int(published.cell(f"{place}; {rules}; {one}")) for one in hands)
         for rules in ("paper's rules", "A + B + C", "queues")
     }
 
@@ -142,7 +142,7 @@ def make_findings(settings: argparse.Namespace) -> None:
     run_study(asked, planned(compare.__file__, asked))
     behaviours, shares, by_rules = policies(results), winners(results), deliveries()
     wins = [[name, percent(share)] for name, share in zip(LEARNERS, shares, strict=True)]
-    pages.show("paper_winners", [Table("", ("Learner", "best in"), wins)], True)
+    published.show("paper_winners", [Table("", ("Learner", "best in"), wins)], True)
     with matplotlib.rc_context({"font.family": "DejaVu Sans"}):
         for theme, colours in THEMES.items():
             drawn = {

@@ -23,7 +23,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import TYPE_CHECKING, Any
 
     import numpy as np
-    import pages
+    import published
     from colony import LARGE_SIZE, task_in, world_of
     from colony_findings import ABROAD, EVALUATION_EPSILON, JOINT, WORLD_KINDS, WORLDS
     from colony_findings import RULES as AS_NAMED
@@ -106,7 +106,7 @@ def print_table(settings: argparse.Namespace) -> None:
     ]  # no study has NetLogo's
     print(*map(rule, FOLLOWED), sep="\n")
     made = Table("", columns, rows, text_columns=2)
-    pages.show(settings.publish or "", [made], bool(settings.publish))
+    published.show(settings.publish or "", [made], bool(settings.publish))
 
 
 def rule(observation: str) -> str:

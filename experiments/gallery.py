@@ -208,7 +208,7 @@ def make_figures(folder: Path) -> None:
     import bridge
     import colony
     import compare
-    import pages
+    import published
     from PIL import Image
 
     from taichi_ants.studies.command import planned, run_study
@@ -218,8 +218,8 @@ def make_figures(folder: Path) -> None:
         settings = script.parse_arguments([*words, "--out", str(results / script.__name__)])
         run_study(settings, planned(script.__file__, settings))
         for table in (settings.out / "tables").glob("*.json"):
-            shutil.copy(table, pages.data_file(table.stem))
-    pages.fill()
+            shutil.copy(table, published.data_file(table.stem))
+    published.fill()
     folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
         with Image.open(results / source) as image:

@@ -13,7 +13,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import Annotated
 
     import numpy as np
-    import pages
+    import published
     import taichi as ti
 
     from taichi_ants import runtime
@@ -172,15 +172,15 @@ def print_table(settings: argparse.Namespace) -> None:
             f"--choices {n} with --colonies {colonies} needs {2 * n * colonies / 1e9:.0f} GB; "
             f"their product must be at most {MOST_CHOICES // 2}, so reduce either of them."
         )
-    cases = [(str(r), r, 0, published) for r, published in PUBLISHED.items()]
+    cases = [(str(r), r, 0, theirs) for r, theirs in PUBLISHED.items()]
     cases += [(f"{LATE_RATIO}, opens late", LATE_RATIO, n, PUBLISHED_LATE)]
     rows: list[list[str]] = []
-    for name, ratio, opens, published in cases:
+    for name, ratio, opens, theirs in cases:
         how = {"ants": opens + n, "opens": opens, "seed": settings.seed}
         took = choices(*crossing_steps(ratio), colonies, **how, threads=settings.threads)
         shown = {"ours": class_shares(took, opens + n // 2 + 1, opens + n)}
         if n == AS_PUBLISHED:
-            shown["published"] = published
+            shown["published"] = theirs
         rows += [[name, kind, *(f"{share:.1f}" for share in row)] for kind, row in shown.items()]
     # A share p of N colonies has the standard error sqrt(p (1 - p) / N), the largest with p = 1/2.
     notes = (
@@ -190,7 +190,7 @@ def print_table(settings: argparse.Namespace) -> None:
         f"{50 / colonies**0.5:.1f} percentage points.",
     )
     columns = ("r", "", *(f"{low}-{low + 20} %" for low in range(0, 100, 20)))
-    pages.show("goss", [Table("", columns, rows, notes, 2)], settings.publish)
+    published.show("goss", [Table("", columns, rows, notes, 2)], settings.publish)
 
 
 if __name__ == "__main__":

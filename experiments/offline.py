@@ -20,7 +20,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from pathlib import Path
 
     import numpy as np
-    import pages
+    import published
 
     from taichi_ants import Colony, TrainingConfig, evaluate, load_policy, offline, train, worlds
     from taichi_ants.analysis.statistics import bootstrap_interval
@@ -71,7 +71,7 @@ def print_tables(settings: argparse.Namespace) -> None:
     for title, table_of in (("data", learning), ("evaluation", judging), ("colonies", dying)):
         with progress_bar(title) as progress:
             table = table_of(seeds, progress)
-        pages.show(f"offline_{title}", [table], settings.publish)
+        published.show(f"offline_{title}", [table], settings.publish)
 
 
 def shown(values: np.ndarray, digits: int = 2) -> str:

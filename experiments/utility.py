@@ -19,7 +19,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import Annotated
 
     import numpy as np
-    import pages
+    import published
     import taichi as ti
     from ant_system import first_true, open_cells
     from taichi.math import popcnt
@@ -282,7 +282,7 @@ def print_table(settings: argparse.Namespace) -> None:
             outcomes = [run(settings, world, n, room) for n, world in enumerate(maps[kind])]
             rows.append([kind, f"{room}", *row(outcomes)])
             progress(len(rows) / (len(WORLDS) * len(settings.room)))
-    pages.show("utility", [Table("", COLUMNS, rows)], settings.publish)
+    published.show("utility", [Table("", COLUMNS, rows)], settings.publish)
 
 
 def run(settings: argparse.Namespace, world: World, seed: int, room: int) -> Foraging:

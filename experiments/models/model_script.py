@@ -16,7 +16,7 @@ from taichi_ants.analysis.tables import Table
 from taichi_ants.studies.command_line import Parser, run_command, whole_number
 
 sys.path.append(str(Path(__file__).parents[1]))
-import pages
+import published
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +66,7 @@ def run(
             style.frame(figure, found.title, found.caption, style.legend_entries(np.ravel(axes)))
         picture = folder / f"{name}.png"
         style.save(figure, picture)
-        pages.show(name, [table(found.summary)], options.publish, picture)
+        published.show(name, [table(found.summary)], options.publish, picture)
         print(f"Numbers: {folder / name}.csv. Figure: {picture}.")
 
     run_command(main)
