@@ -2,7 +2,7 @@
 
 For each ratio r of the branch lengths, the script prints the share of colonies in each class of the
 share of ants on the short branch. It also prints the published shares and the standard error. In
-the last rows, the short branch opens late. See docs/models/index.md.
+the last rows, the short branch opens late. See docs/models/goss.md.
 """
 
 # No `from __future__ import annotations`, because Taichi reads the annotations of kernels.

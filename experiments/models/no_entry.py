@@ -4,7 +4,7 @@ Corridors fork twice, and food grows back at the end of one of four branches. Al
 attractive path wherever they go, and choose the next cell by it, without learning. Pharaoh's ants
 also mark unrewarding branches with a repellent (Robinson et al. 2005). Here, ants mark wherever
 they go after a search in vain, or only where they see three obstacles. In a control, the repellent
-lies on the three branches without food from the start. See docs/models.md.
+lies on the three branches without food from the start. See docs/models/no_entry.md.
 """
 
 from typing import Annotated

@@ -11,9 +11,8 @@ from guides import blocks
 
 
 @pytest.mark.slow  # colonies that learn, and rules that compile
-@pytest.mark.parametrize("page", ["models", "how-to/models"])
-def test_the_examples_of_a_guide_work(page, tmp_path):
-    parts = blocks(page) if page == "models" else blocks(page)[:5]
+def test_the_examples_of_a_guide_work(tmp_path):
+    parts = blocks("how-to/models")[:5]
     assert len(parts) > 2
     script = tmp_path / "guide.py"  # rules need a file
     script.write_text("\n\n".join(parts).replace("range(1000, 1100)", "range(1000, 1002)"), "utf-8")
