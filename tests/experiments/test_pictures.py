@@ -253,7 +253,7 @@ def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many
 
 
 def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why(lines) -> None:
-    """docs/rendering.md says so of this seed."""
+    """docs/how-to/pictures.md says so of this seed."""
     arguments = learning.parse_arguments(["--seed", "7", "--checkpoints", "0", "10", "20"])
     seed, checkpoints = noted_checkpoints(arguments, paper())
     assert seed == 7
@@ -261,7 +261,7 @@ def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why
     assert notes == [("", ""), ("circles with food", ""), ("delivered", "")]
     returns = [int(checkpoint.episode.trace.rewards.sum()) for checkpoint in checkpoints]
     assert returns[1] > returns[2] == 45
-    told = (ROOT / "docs" / "rendering.md").read_text(encoding="utf-8")
+    told = (ROOT / "docs/how-to/pictures.md").read_text(encoding="utf-8")
     assert re.search(rf"returns\s+{returns[1]}\s+after\s+10\s+episodes", told)
     list(learning_frames(checkpoints, (1200, 480)))
     assert f"step 150, return {returns[1]}: circles with food" in lines
