@@ -13,9 +13,9 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
-from inspect import isclass, ismodule
+from inspect import isclass, isfunction, ismodule
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 from unittest import mock
 
 DOCS = Path(__file__).parent
@@ -213,8 +213,8 @@ def public_names(module: Any) -> list[str]:
     """Return the public names of a module that are not modules; by default, what it defines."""
     names = getattr(module, "__all__", None)
     if names is None:
-        own = ((n, v) for n, v in vars(module).items() if getattr(v, "__name__", "") == n)
-        names = [n for n, v in own if v.__module__ == module.__name__ and not isinstance(v, TypeVar)]
+        own = {n: v for n, v in vars(module).items() if isclass(v) or isfunction(v)}
+        names = [n for n, v in own.items() if v.__module__ == module.__name__]
     return [n for n in names if not n.startswith("_") and not ismodule(getattr(module, n))]
 
 
