@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import runpy
 import sys
 from functools import partial
 from pathlib import Path
@@ -55,10 +56,22 @@ PAGES = {
         ("page/base.css", "article/article.css"),
         (
             *(f"page/{name}.js" for name in (*_SHARED, "scenes")),
-            *(f"article/{name}.js" for name in ("pieces", "article")),
+            *(f"article/{name}.js" for name in ("pieces", "world", "article")),
         ),
         _COLONY,
         500_000,
+    ),
+    "lessons.html": Page(
+        "lessons/lessons.html",
+        ("page/base.css", "article/article.css", "lessons/lessons.css"),
+        (
+            *(f"page/{name}.js" for name in (*_SHARED, "mind", "scenes")),
+            *(f"article/{name}.js" for name in ("pieces", "world")),
+            *("lessons/random.js", "../docs/lessons/page/room.js"),
+            *("../docs/lessons/page/experiments.js", "lessons/lessons.js"),
+        ),
+        {**_COLONY, "ANT_WASM": "ant.wasm"},
+        400_000,
     ),
 }
 FONTS = LAB / "page" / "fonts"
@@ -97,6 +110,10 @@ def page(name: str) -> str:
         "SCRIPT": f"const BINARIES = {json.dumps(binaries)};\n{script(one.modules)}",
     }
     whole = (LAB / one.markup).read_text("utf-8")
+    if name == "lessons.html":
+        text = runpy.run_path(str(DOCS / "lessons" / "page" / "text.py"))
+        contents, chapters = text["lessons"](DOCS / "lessons")
+        whole = whole.replace("<!-- CONTENTS -->", contents).replace("<!-- LESSONS -->", chapters)
     for key, text in parts.items():
         whole = whole.replace(f"/* {key} */", text)
     if (size := len(whole.encode())) > one.most_bytes:
