@@ -301,6 +301,7 @@ def test_questions_wait_for_a_prediction_and_answer_by_what_they_measure(opened)
         assert not page.read("lab.ui.playing")
         assert page.read("lab.runs.map((run) => run.tick)") == begun
         assert page.tab.is_visible("#options")
+        assert page.tab.inner_text("#rate") == "?"  # the rates would give the answer away
         page.read("lab.say(0); lab.play(false)")
         page.until("lab.question.found", most=3000)
         found = page.read("lab.question.found")
