@@ -12,8 +12,12 @@ import json
 import re
 import runpy
 import sys
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
+
+from taichi_ants.live.server import PARTS
+from taichi_ants.viewer.page import assemble, part
 
 LAB = Path(__file__).parent
 DOCS = LAB.parent / "docs"
@@ -32,7 +36,8 @@ class Page(NamedTuple):
     most_bytes: int
 
 
-_SHARED = ("worlds", "engine", "link", "geometry", "looks", "run", "story", "shapes", "draw")
+_ENGINE = ("worlds", "engine", "link")
+_SHARED = (*_ENGINE, "geometry", "looks", "run", "story", "shapes", "draw")
 _LAB = (
     *("plot", "mind", "scenes", "daily", "brush", "controls", "train", "address", "film"),
     *("embed", "main"),
@@ -116,7 +121,27 @@ def page(name: str) -> str:
     return whole
 
 
+def live_page() -> str:
+    """Return the live page of the package with a worker in place of the server."""
+    controls, style, _socket, *scripts = (part(name, "taichi_ants.live") for name in PARTS)
+    worker = script((*(f"page/{name}.js" for name in _ENGINE), "live/worker.js"))
+    headers = (LAB / "live" / "headers.json").read_text("utf-8").strip()
+    constants = {
+        "WORKER": json.dumps(f"{worker}\nserve();"),
+        "COLONY": json.dumps(base64_of(LAB / "engine" / "colony.wasm")),
+        "HEADERS": headers,
+    }
+    lines = (f"const {name} = {text};" for name, text in constants.items())
+    transport = (LAB / "live" / "transport.js").read_text("utf-8")
+    scripts = [transport, *lines, *scripts]
+    whole = assemble("Taichi Ants, live", controls=controls, style=style, script="\n".join(scripts))
+    # The worker is a part of the page, and compiles WebAssembly.
+    return whole.replace("script-src '", "worker-src blob:; script-src 'wasm-unsafe-eval' '", 1)
+
+
+BUILDS = {**{name: partial(page, name) for name in PAGES}, "live.html": live_page}
+
 if __name__ == "__main__":
-    for name in PAGES:
-        (DOCS / name).write_text(page(name), encoding="utf-8")
+    for name, build in BUILDS.items():
+        (DOCS / name).write_text(build(), encoding="utf-8")
         sys.stdout.write(f"{DOCS / name}: {(DOCS / name).stat().st_size:,} bytes\n")
