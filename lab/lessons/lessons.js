@@ -30,7 +30,7 @@ function plotOf(lines, across) {
     const style = `stroke="var(${COLOURS[k]})" stroke-width="2" stroke-dasharray="${DASHES[k]}" fill="none"`;
     return `<path d="${path}" ${style}/><path d="M${at},12h24" ${style}/><text x="${at + 29}" y="16">${escaped(name)}</text>`;
   });
-  return `<svg class="plot" viewBox="0 0 ${W} ${H}" role="img" aria-label="${escaped(across)}">${scale.join("")}${drawn.join("")}<text x="${W}" y="${H - 4}" text-anchor="end">${escaped(across)}</text></svg>`;
+  return `<div class="wide"><svg class="plot" viewBox="0 0 ${W} ${H}" role="img" aria-label="${escaped(across)}">${scale.join("")}${drawn.join("")}<text x="${W}" y="${H - 4}" text-anchor="end">${escaped(across)}</text></svg></div>`;
 }
 
 /** The recorded steps of lone ants: a map, a slider, and what happened in a step. */
@@ -93,8 +93,8 @@ class Walk {
 class Place {
   constructor(element, page) {
     [this.element, this.page, this.experiment] = [element, page, EXPERIMENTS[element.dataset.run]];
-    const { code, answer, now, label = code ? "Check" : "Run" } = this.experiment;
-    element.innerHTML = (code ? `<textarea class="code" spellcheck="false" autocapitalize="off" aria-label="Your function" rows="${code.split("\n").length + 2}">${escaped(code)}</textarea>` : "")
+    const { ask, code, answer, now, label = code ? "Check" : "Run" } = this.experiment;
+    element.innerHTML = (ask ? `<p>${ask}</p>` : "") + (code ? `<textarea class="code" spellcheck="false" autocapitalize="off" aria-label="Your function" rows="${code.split("\n").length + 2}">${escaped(code)}</textarea>` : "")
       + `<p class="acts"><button class="seeds">${label}</button></p><div class="result" aria-live="polite"></div>`
       + (code ? `<details><summary>Answer</summary><pre>${escaped(answer)}</pre></details>` : "");
     [this.button, this.result] = [element.querySelector("button"), element.querySelector(".result")];

@@ -9,8 +9,9 @@ const WALLS = { right: [0, 8], left: [1, 9], both: [1, 8] }; // columns with roc
 
 export const PLAN = {
   code: `function plan(q, model, n, draw) {
-  // model lists what was stored: { s, a, r, next, over }. draw(k) gives a random whole
-  // number below k. Learn from n stored steps, with step size 0.5 and discount 0.95.
+  // model lists what was stored: { s, a, r, next, over }; q[s] is a row.
+  // draw(k) gives a random whole number below k.
+  // Learn from n stored steps, with step size 0.5 and discount 0.95.
 }`,
   answer: `function plan(q, model, n, draw) {
   for (let k = 0; k < n; k++) {
