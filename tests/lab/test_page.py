@@ -20,7 +20,7 @@ QUESTIONS = ("never", "copies", "home", "bridge", "wall", "halves")
 SIZES = {"phone": (390, 844), "tablet": (1024, 768), "desk": (1440, 900)}
 
 
-@pytest.mark.parametrize("name", ["lab.html", "article.html"])
+@pytest.mark.parametrize("name", ["lab.html", "article.html", "lessons.html"])
 def test_the_committed_page_is_built_from_the_modules(name):
     spec = importlib.util.spec_from_file_location("build_lab", ROOT / "lab" / "build.py")
     build = importlib.util.module_from_spec(spec)

@@ -153,7 +153,7 @@ function practice(lone, initial, epsilon) {
   const seeds = upTo(20), { deliveries } = lone.train({ ...LEARNER, epsilon, decay: 1, first: initial, seeds, episodes: 200 });
   const tables = lone.values, tried = upTo(10).map((rollout) => lone.follow(tables, { seeds, rollout }));
   return [percent(mean(seeds.map((k) => mean(deliveries.subarray(200 * k + 150, 200 * k + 200))))), percent(mean(tried.map((one) => mean(one.deliveries)))),
-          mean(tried.map(({ steps }) => mean(steps))).toFixed(1)];
+          mean(tried.map(({ steps }) => mean(steps))).toFixed(2)];
 }
 
 // Lessons 2 and 5 --------------------------------------------------------------------------------

@@ -1,9 +1,10 @@
-"""The text of the lessons' page, from the notebooks in docs/lessons.
+"""The text of docs/lessons.html, from the notebooks in docs/lessons; lab/build.py calls `lessons`.
 
 The notebooks are the only source of the lessons. In the metadata of a cell, `page` names what the
-page has in its place: pieces of lab/lessons/experiments.js, `world:NAME` for a world of the
-article, `recorded` for the saved result, `drawn` for one that is a drawing, or `none`. A code cell without `page` is left out. The
-metadata `teachers` is a note that only the teachers' edition shows.
+page has in its place: experiments of experiments.js, `world:NAME` for a world of the article,
+`recorded` for the saved result, `drawn` for one that is a drawing, or `none`. A code cell without
+`page` is left out, except in solutions, whose results are shown. The metadata `teachers` is a note
+that only the teachers' edition shows.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _MATH = (
     (r"\\(?:big|,)", " "),
     (r"\\leftarrow", "←"),
     (r"\\dots", "…"),
-    *((rf"\\{name}(?![a-z])", letter) for name, letter in zip(("alpha", "gamma", "delta"), "αγδ")),
+    *((r"\\alpha", "α"), (r"\\gamma", "γ"), (r"\\delta", "δ")),
     (r"\\max", "max"),
 )
 _WORDS = (
@@ -31,7 +32,10 @@ _WORDS = (
     (r"\*\*(.+?)\*\*", r"<b>\1</b>"),
     (r"\*(\S|\S.*?\S)\*", r"<i>\1</i>"),
 )
-ON_PAPER = '<p class="aside">Do them on paper, in the notebook, or below, where there is a field to write in.</p>'
+_EXERCISES = (
+    "<h2>Exercises</h2>",
+    '<h2>Exercises</h2><p class="aside">Do them on paper, in the notebook, or in fields below.</p>',
+)
 _LIST = re.compile(r"^(?:- |\d\. )", re.M)
 
 
@@ -116,15 +120,17 @@ def lesson(path: Path) -> str:
             solutions = 1
         elif solutions:
             parts.append("</details>" * (solutions > 1))
-            parts.append(f"<details><summary><b>Solution {solutions}</b></summary>{markdown(source)}")
+            parts.append(
+                f"<details><summary><b>Solution {solutions}</b></summary>{markdown(source)}"
+            )
             solutions += 1
         else:
-            parts.append(markdown(source).replace("<h2>Exercises</h2>", f"<h2>Exercises</h2>{ON_PAPER}"))
+            parts.append(markdown(source).replace(*_EXERCISES))
         if note := metadata.get("teachers"):
             parts.append(f'<aside class="teachers"><b>For teachers.</b> {inline(note)}</aside>')
         parts += [piece(name, cell) for name in names]
     link = f'<a href="lessons/{path.name}">notebook in Python</a>'
-    parts.append(f"</details><p class=\"aside\">The same lesson is a {link}.</p>")
+    parts.append(f'</details><p class="aside">The same lesson is a {link}.</p>')
     return f'<article id="{path.stem[0]}">' + "\n".join(parts) + "</article>\n"
 
 
