@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import nullcontext
 from functools import cache
 from itertools import accumulate
 from typing import Any
@@ -15,7 +16,11 @@ from taichi.lang.argpack import ArgPack
 from taichi.types import ndarray_type
 
 from taichi_ants import runtime
+from taichi_ants.arithmetic.guards import guarded
 from taichi_ants.errors import AntsError
+
+_ARRAYS = np.ndarray, ti.Ndarray
+_ZERO = "zero"  # the number in packs for the guards
 
 
 class Launch:
@@ -25,7 +30,9 @@ class Launch:
     A pack takes over a millisecond to make, so it is reused until Taichi is reset.
 
     `kernel_of` returns the kernel for a pack type. Packs contain NumPy arrays, which kernels change
-    in place; whole numbers, as i32, or u64 for `np.uint64`; and floats, as f32.
+    in place; arrays of `ti.ndarray`; whole numbers, as i32, or u64 for `np.uint64`; and floats, as
+    f32. On a GPU, Taichi copies NumPy arrays at each launch, in both directions, but not those of
+    `ti.ndarray`; and kernels are compiled with the guards of `arithmetic.guards`.
     """
 
     def __init__(self, kernel_of: Callable[[Any], Any]) -> None:
@@ -40,6 +47,7 @@ class Launch:
         """Launch with these values; names and types are always the same, arrays C-contiguous."""
         if self._taichi() is not ti.lang.impl.get_runtime():
             runtime.start()  # the caller may have reset Taichi
+            check_not_lost(values.values())
             self._prepare(values)
         for name, value in values.items():
             if self._known[name] is not value:
@@ -54,25 +62,30 @@ class Launch:
             self(values)
 
     def _launch(self) -> None:
-        if self._compiled is None:
-            self._kernel(self._pack)
-        else:
-            with self._flushing:
-                ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
+        if self._for_gpu:
+            # A launch on a GPU replaces the pointers in its context by those of copies.
+            self._context = self._new_context()
+            for name, place in self._places.items():
+                _pass(self._context, place, self._known[name])
+        with self._flushing:
+            ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
         """Compile the kernel and make its pack, as Taichi does at a launch."""
+        self._for_gpu = runtime.compiles_for_gpu()
+        if self._for_gpu:
+            values = {**values, _ZERO: 0}
         kind = _pack_type(tuple((name, *_kind(value)) for name, value in values.items()))
-        self._kernel = self._kernel_of(kind)
         taichi = ti.lang.impl.get_runtime()
-        program, kernel = taichi.prog, self._kernel._primal
+        program, kernel = taichi.prog, self._kernel_of(kind)._primal
         # `kind(**values)` would make two packs.
         self._pack = pack = _Pack(kind, dict(values))
         memory = pack._ArgPack__argpack
         finalize(pack, _delete, ref(taichi), memory).atexit = False
         config = program.config()
         try:
-            with runtime.quiet():
+            guards = guarded(0, pack.places[-2]) if self._for_gpu else nullcontext()
+            with runtime.quiet(), guards:
                 lowered = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
                 compiled = program.compile_kernel(config, program.get_device_caps(), lowered)
         except ti.TaichiCompilationError as error:  # only code of plugins causes one
@@ -80,27 +93,68 @@ class Launch:
                 f"Taichi cannot compile a kernel with your code: {last_line(error)}; try it with "
                 "`taichi-ants check FILE`."
             ) from error
-        self._context = lowered.make_launch_context()
-        self._context.set_arg_argpack((0,), memory)
-        # A GPU copies arrays at each launch.
-        self._compiled = compiled if config.arch in (ti.x64, ti.arm64) else None
+        self._lowered, self._compiled = lowered, compiled
+        self._context = self._new_context()
         # The context needs the arrays as further arguments after the pack.
-        arrays = [name for name, value in values.items() if isinstance(value, np.ndarray)]
+        arrays = [name for name, value in values.items() if isinstance(value, _ARRAYS)]
         self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
         self._known = dict.fromkeys(values)
         self._taichi = ref(taichi)
+
+    def _new_context(self) -> Any:
+        """Return a context for launches with the pack, still without the arrays."""
+        context = self._lowered.make_launch_context()
+        context.set_arg_argpack((0,), self._pack._ArgPack__argpack)
+        return context
 
     def _set(self, name: str, value: Any) -> None:
         """Pass a value to Taichi; skip the pack if the value has not changed."""
         # Taichi leaks some bytes for each value that is set again.
         known = self._pack[name]
-        if known is not value and (isinstance(value, np.ndarray) or known != value):
+        if known is not value and (isinstance(value, _ARRAYS) or known != value):
             self._pack[name] = value
-        if isinstance(value, np.ndarray):
-            self._context.set_arg_external_array_with_shape(
-                self._places[name], value.ctypes.data, value.nbytes, value.shape, 0
-            )
+        if isinstance(value, _ARRAYS) and not self._for_gpu:
+            _pass(self._context, self._places[name], value)
         self._known[name] = value
+
+
+def has_guards(arguments: Any) -> bool:
+    """Return whether a kernel with this type of pack is compiled for a GPU."""
+    return _ZERO in arguments.members
+
+
+def on_device(array: np.ndarray) -> Any:
+    """Return a copy of an array that stays in the memory of the device between launches."""
+    copy = ti.ndarray(getattr(ti, _kind(array)[0]), array.shape)
+    copy.taichi = ref(ti.lang.impl.get_runtime())
+    with runtime.quiet():
+        copy.from_numpy(array)
+    return copy
+
+
+def check_not_lost(values: Iterable[Any]) -> None:
+    """Raise AntsError if Taichi was reset after one of the values came to the device."""
+    running = ti.lang.impl.get_runtime()
+    if any(getattr(value, "taichi", lambda: running)() is not running for value in values):
+        raise AntsError(
+            "Taichi was reset, which destroys the state of environments on a GPU; create them again."
+        )
+
+
+def call(kernel: Any, *arguments: Any) -> None:
+    """Launch a kernel with these arguments and a last one, 0, with which it has guards on a GPU."""
+    guards = guarded(len(arguments)) if runtime.compiles_for_gpu() else nullcontext()
+    with runtime.quiet(), guards:
+        kernel(*arguments, 0)
+
+
+def _pass(context: Any, place: tuple[int], array: Any) -> None:
+    """Pass an array to a launch."""
+    if isinstance(array, np.ndarray):
+        address, size = array.ctypes.data, array.nbytes
+        context.set_arg_external_array_with_shape(place, address, size, array.shape, 0)
+    else:
+        context.set_arg_ndarray(place, array.arr)
 
 
 def last_line(error: Exception) -> str:
@@ -146,6 +200,8 @@ def _kind(value: Any) -> tuple[str, int]:
     """Return the name of a Taichi type, and the number of dimensions, 0 for a number."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype.kind}{8 * value.dtype.itemsize}", value.ndim
+    if isinstance(value, ti.Ndarray):
+        return value.dtype.to_string(), len(value.shape)
     if isinstance(value, np.uint64):
         return "u64", 0
     return ("i32" if isinstance(value, (int, np.integer)) else "f32"), 0

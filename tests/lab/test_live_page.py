@@ -51,7 +51,7 @@ def test_a_visit_can_be_looked_back_at_continued_and_saved(tmp_path):
         tab.keyboard.press("Home")
         until(tab, "() => viewer.player.moment === 0")
         assert (
-            tab.evaluate(f"() => viewer.history.frames.filter(({{ acts }}) => acts.length).length")
+            tab.evaluate("() => viewer.history.frames.filter(({ acts }) => acts.length).length")
             == TICK
         )
         assert tab.evaluate("() => viewer.history.events.length > 20")
