@@ -4,7 +4,7 @@
 
 import { hexDistance, LETTERS } from "../../../lab/page/engine.js";
 import { live, PLAN } from "./room.js";
-import { Random } from "../../../lab/lessons/random.js";
+import { Random } from "./random.js";
 
 export const ACTS = ["left", "forward", "right", "pick up", "deliver"];
 const CUE = 2, CARRIES = 64; // the code of a trail or of a way home; the first observation with food

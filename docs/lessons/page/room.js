@@ -1,6 +1,6 @@
 /* room.js: the room of lesson 4, in which ants know their state, and Dyna-Q; equal to the notebook, number by number. */
 
-import { Random } from "../../../lab/lessons/random.js";
+import { Random } from "./random.js";
 
 const ROOM = { width: 9, height: 6, start: 5 * 9 + 2, food: 8, change: 1500 };
 const AROUND = [[1, 0], [1, -1], [0, -1], [-1, 0], [-1, 1], [0, 1]];
