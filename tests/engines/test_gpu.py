@@ -1,6 +1,7 @@
 """Kernels as they are compiled and launched for a GPU, on the CPU: guards, and equal results."""
 
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 
 import taichi_ants
-from taichi_ants import evaluate, learners, runtime, train, worlds
+from taichi_ants import AntsError, evaluate, learners, runtime, train, worlds
+from taichi_ants.envs.forage import HexForageVectorEnv
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 
@@ -124,6 +126,34 @@ def test_training_is_the_same_as_on_a_gpu(name, as_on_gpu, monkeypatch):
 def assert_same(left, right):
     for name, value in left.items():
         np.testing.assert_array_equal(value, right[name], err_msg=name)
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_environments_are_the_same_as_on_a_gpu(mode, monkeypatch):
+    task = Task().replace(noise={"slip": 0.1, "misread": 0.1}, pheromone={"deposit": "fading"})
+    made = {}
+    for on_gpu in (False, True):
+        monkeypatch.setattr(runtime, "gpu_kernels_on_cpu", on_gpu)
+        envs = HexForageVectorEnv(600, task=task, max_steps=60, autoreset_mode=mode)
+        envs.reset(seed=4)
+        steps = [envs.step(np.full(600, action))[:4] for action in (1, 0, 1, 2, 1)]
+        followed = envs.rollout("trail_follower", 130, epsilon=0.3)
+        given = envs.rollout(np.random.default_rng(1).integers(5, size=(70, 600)))
+        copied = pickle.loads(pickle.dumps(envs))
+        now, later = (one._ants.batched.snapshot(7) for one in (envs, copied))
+        last = envs.step(np.full(600, 1))[:4]
+        made[on_gpu] = [*sum(steps, ()), *followed, *given, now.ground, now.trail, later.trail]
+        made[on_gpu] += last
+    for number, (ours, theirs) in enumerate(zip(made[False], made[True], strict=True)):
+        np.testing.assert_array_equal(ours, theirs, err_msg=str(number))
+
+
+def test_environments_on_a_gpu_end_with_a_reset_of_taichi(as_on_gpu):
+    envs = HexForageVectorEnv(2)
+    envs.reset(seed=1)
+    envs._ants.batched._cells_on_gpu.taichi = lambda: None  # as if it were of another runtime
+    with pytest.raises(AntsError, match="Taichi was reset, which destroys environments"):
+        pickle.dumps(envs)
 
 
 def test_all_kernels_have_guards_on_a_gpu():
