@@ -236,13 +236,14 @@ def test_mistakes_are_one_sentence(name, arguments, said, tmp_path, capsys) -> N
 def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many_ants(
     lines,
 ) -> None:
-    """docs/paper.md says of it what the picture shows, and how many of 200 ants do so."""
+    """docs/results/paper.md says of it what the picture shows, and how many of 200 ants do so."""
     arguments = gallery.drawing(gallery.GALLERY["learning.gif"])[1]
     _, checkpoints = noted_checkpoints(arguments, paper())
     steps = [len(checkpoint.episode.trace) for checkpoint in checkpoints]
     notes = [checkpoint.note for checkpoint in checkpoints]
     assert len({*zip(steps, notes, strict=True)}) == len(checkpoints)
-    page = " ".join((ROOT / "docs" / "paper.md").read_text(encoding="utf-8").lower().split())
+    page = (ROOT / "docs" / "results" / "paper.md").read_text(encoding="utf-8")
+    page = " ".join(page.lower().split())
     for n, checkpoint in zip(steps[1:], checkpoints[1:], strict=True):
         assert checkpoint.note == "delivered"
         number, _, seeds = checkpoint.among.split()[:3]
