@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from itertools import accumulate
 from typing import Any
@@ -62,28 +62,18 @@ class Launch:
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
         """Compile the kernel and make its pack, as Taichi does at a launch."""
-        kind = _pack_type(tuple((name, *_kind(value)) for name, value in values.items()))
+        kind = _pack_type(tuple((name, *kind_of(value)) for name, value in values.items()))
         self._kernel = self._kernel_of(kind)
         taichi = ti.lang.impl.get_runtime()
-        program, kernel = taichi.prog, self._kernel._primal
         # `kind(**values)` would make two packs.
         self._pack = pack = _Pack(kind, dict(values))
         memory = pack._ArgPack__argpack
         finalize(pack, _delete, ref(taichi), memory).atexit = False
-        config = program.config()
-        try:
-            with runtime.quiet():
-                lowered = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
-                compiled = program.compile_kernel(config, program.get_device_caps(), lowered)
-        except ti.TaichiCompilationError as error:  # only code of plugins causes one
-            raise AntsError(
-                f"Taichi cannot compile a kernel with your code: {last_line(error)}; try it with "
-                "`taichi-ants check FILE`."
-            ) from error
+        lowered, compiled = _compile(self._kernel, pack)
         self._context = lowered.make_launch_context()
         self._context.set_arg_argpack((0,), memory)
         # A GPU copies arrays at each launch.
-        self._compiled = compiled if config.arch in (ti.x64, ti.arm64) else None
+        self._compiled = compiled if taichi.prog.config().arch in (ti.x64, ti.arm64) else None
         # The context needs the arrays as further arguments after the pack.
         arrays = [name for name, value in values.items() if isinstance(value, np.ndarray)]
         self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
@@ -101,6 +91,44 @@ class Launch:
                 self._places[name], value.ctypes.data, value.nbytes, value.shape, 0
             )
         self._known[name] = value
+
+
+class DeviceLaunch:
+    """A kernel whose arguments are a few arrays on the device, `ti.ndarray`."""
+
+    def __init__(self, kernel: Callable[..., None]) -> None:
+        self._kernel = kernel
+        self._taichi: Any = lambda: None  # the Taichi runtime for which the kernel was compiled
+        self._flushing = runtime.Flushing()
+
+    def __call__(self, arrays: Sequence[Any]) -> None:
+        """Launch with arrays of the present Taichi runtime; it may return before the end."""
+        taichi = ti.lang.impl.get_runtime()
+        if self._taichi() is not taichi:
+            self._lowered, self._compiled = _compile(self._kernel, *arrays)
+            self._taichi = ref(taichi)
+        # A context for each launch, because a GPU replaces the addresses in it by its own.
+        context = self._lowered.make_launch_context()
+        for place, array in enumerate(arrays):
+            context.set_arg_ndarray((place,), array.arr)
+        with self._flushing:
+            taichi.prog.launch_kernel(self._compiled, context)
+
+
+def _compile(kernel: Any, *arguments: Any) -> tuple[Any, Any]:
+    """Return a kernel for these arguments, before and after its compilation by Taichi."""
+    program, primal = ti.lang.impl.get_runtime().prog, kernel._primal
+    try:
+        with runtime.quiet():
+            lowered = primal.compiled_kernels[primal.ensure_compiled(*arguments)]
+            return lowered, program.compile_kernel(
+                program.config(), program.get_device_caps(), lowered
+            )
+    except ti.TaichiCompilationError as error:  # only code of plugins causes one
+        raise AntsError(
+            f"Taichi cannot compile a kernel with your code: {last_line(error)}; try it with "
+            "`taichi-ants check FILE`."
+        ) from error
 
 
 def last_line(error: Exception) -> str:
@@ -142,7 +170,7 @@ def _delete(taichi: ref, memory: Any) -> None:
         program.delete_argpack(memory)
 
 
-def _kind(value: Any) -> tuple[str, int]:
+def kind_of(value: Any) -> tuple[str, int]:
     """Return the name of a Taichi type, and the number of dimensions, 0 for a number."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype.kind}{8 * value.dtype.itemsize}", value.ndim
