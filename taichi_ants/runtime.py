@@ -39,6 +39,10 @@ if platform.machine() == "x86_64" and platform.libc_ver()[0] == "glibc":
     _libm = ctypes.PyDLL("libm.so.6")
     _read_modes, _set_modes = _libm.fegetmode, _libm.fesetmode
 
+# Whether kernels for a CPU are compiled and launched as those for a GPU, with the same results, so
+# that tests can compare the two on machines without one.
+gpu_kernels_on_cpu = False
+
 # A lock for environments in several threads, because Taichi compiles and launches for one thread.
 alone = threading.RLock()
 
@@ -108,6 +112,13 @@ def check_on_cpu(running: Runtime, what: str) -> None:
     """Raise AntsError if Taichi runs on a GPU, for kernels with too many arguments for one."""
     if running.arch != "cpu":
         raise AntsError(f"arch is {running.arch!r}, but {what} only on the CPU; use arch='cpu'.")
+
+
+def compiles_for_gpu() -> bool:
+    """Return whether kernels are compiled for a GPU, by a Taichi that runs."""
+    import taichi as ti
+
+    return gpu_kernels_on_cpu or ti.lang.impl.current_cfg().arch == ti.cuda
 
 
 def start_with_checks() -> None:

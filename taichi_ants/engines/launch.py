@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from functools import cache
 from itertools import accumulate
 from typing import Any
@@ -15,7 +16,10 @@ from taichi.lang.argpack import ArgPack
 from taichi.types import ndarray_type
 
 from taichi_ants import runtime
+from taichi_ants.arithmetic.guards import guarded
 from taichi_ants.errors import AntsError
+
+_ARRAYS = np.ndarray, ti.Ndarray
 
 
 class Launch:
@@ -25,7 +29,9 @@ class Launch:
     A pack takes over a millisecond to make, so it is reused until Taichi is reset.
 
     `kernel_of` returns the kernel for a pack type. Packs contain NumPy arrays, which kernels change
-    in place; whole numbers, as i32, or u64 for `np.uint64`; and floats, as f32.
+    in place; arrays of `ti.ndarray`; whole numbers, as i32, or u64 for `np.uint64`; and floats, as
+    f32. On a GPU, Taichi copies NumPy arrays at each launch, in both directions, but not those of
+    `ti.ndarray`; and kernels are compiled with the guards of `arithmetic.guards`.
     """
 
     def __init__(self, kernel_of: Callable[[Any], Any]) -> None:
@@ -54,81 +60,78 @@ class Launch:
             self(values)
 
     def _launch(self) -> None:
-        if self._compiled is None:
-            self._kernel(self._pack)
-        else:
-            with self._flushing:
-                ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
+        if self._renews:
+            # A launch on a GPU replaces the pointers in its context by those of copies, and on a
+            # CPU those of `ti.ndarray`.
+            self._context = self._new_context()
+            for name, place in self._places.items():
+                _pass(self._context, place, self._known[name])
+        with self._flushing:
+            ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
         """Compile the kernel and make its pack, as Taichi does at a launch."""
+        for_gpu = runtime.compiles_for_gpu()
+        self._renews = for_gpu or any(isinstance(value, ti.Ndarray) for value in values.values())
+        if for_gpu:
+            values = {**values, "zero": 0}
         kind = _pack_type(tuple((name, *kind_of(value)) for name, value in values.items()))
-        self._kernel = self._kernel_of(kind)
         taichi = ti.lang.impl.get_runtime()
+        program, kernel = taichi.prog, self._kernel_of(kind)._primal
         # `kind(**values)` would make two packs.
         self._pack = pack = _Pack(kind, dict(values))
         memory = pack._ArgPack__argpack
         finalize(pack, _delete, ref(taichi), memory).atexit = False
-        lowered, compiled = _compile(self._kernel, pack)
-        self._context = lowered.make_launch_context()
-        self._context.set_arg_argpack((0,), memory)
-        # A GPU copies arrays at each launch.
-        self._compiled = compiled if taichi.prog.config().arch in (ti.x64, ti.arm64) else None
+        config = program.config()
+        try:
+            guards = guarded(0, pack.places[-2]) if for_gpu else nullcontext()
+            with runtime.quiet(), guards:
+                lowered = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
+                compiled = program.compile_kernel(config, program.get_device_caps(), lowered)
+        except ti.TaichiCompilationError as error:  # only code of plugins causes one
+            raise AntsError(
+                f"Taichi cannot compile a kernel with your code: {last_line(error)}; try it with "
+                "`taichi-ants check FILE`."
+            ) from error
+        self._lowered, self._compiled = lowered, compiled
+        self._context = self._new_context()
         # The context needs the arrays as further arguments after the pack.
-        arrays = [name for name, value in values.items() if isinstance(value, np.ndarray)]
+        arrays = [name for name, value in values.items() if isinstance(value, _ARRAYS)]
         self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
         self._known = dict.fromkeys(values)
         self._taichi = ref(taichi)
+
+    def _new_context(self) -> Any:
+        """Return a context for launches with the pack, still without the arrays."""
+        context = self._lowered.make_launch_context()
+        context.set_arg_argpack((0,), self._pack._ArgPack__argpack)
+        return context
 
     def _set(self, name: str, value: Any) -> None:
         """Pass a value to Taichi; skip the pack if the value has not changed."""
         # Taichi leaks some bytes for each value that is set again.
         known = self._pack[name]
-        if known is not value and (isinstance(value, np.ndarray) or known != value):
+        if known is not value and (isinstance(value, _ARRAYS) or known != value):
             self._pack[name] = value
-        if isinstance(value, np.ndarray):
-            self._context.set_arg_external_array_with_shape(
-                self._places[name], value.ctypes.data, value.nbytes, value.shape, 0
-            )
+        if isinstance(value, _ARRAYS) and not self._renews:
+            _pass(self._context, self._places[name], value)
         self._known[name] = value
 
 
-class DeviceLaunch:
-    """A kernel whose arguments are a few arrays on the device, `ti.ndarray`."""
-
-    def __init__(self, kernel: Callable[..., None]) -> None:
-        self._kernel = kernel
-        self._taichi: Any = lambda: None  # the Taichi runtime for which the kernel was compiled
-        self._flushing = runtime.Flushing()
-
-    def __call__(self, arrays: Sequence[Any]) -> None:
-        """Launch with arrays of the present Taichi runtime; it may return before the end."""
-        taichi = ti.lang.impl.get_runtime()
-        if self._taichi() is not taichi:
-            self._lowered, self._compiled = _compile(self._kernel, *arrays)
-            self._taichi = ref(taichi)
-        # A context for each launch, because a GPU replaces the addresses in it by its own.
-        context = self._lowered.make_launch_context()
-        for place, array in enumerate(arrays):
-            context.set_arg_ndarray((place,), array.arr)
-        with self._flushing:
-            taichi.prog.launch_kernel(self._compiled, context)
+def call(kernel: Any, *arguments: Any) -> None:
+    """Launch a kernel with these arguments and a last one, 0, with which it has guards on a GPU."""
+    guards = guarded(len(arguments)) if runtime.compiles_for_gpu() else nullcontext()
+    with runtime.quiet(), guards:
+        kernel(*arguments, 0)
 
 
-def _compile(kernel: Any, *arguments: Any) -> tuple[Any, Any]:
-    """Return a kernel for these arguments, before and after its compilation by Taichi."""
-    program, primal = ti.lang.impl.get_runtime().prog, kernel._primal
-    try:
-        with runtime.quiet():
-            lowered = primal.compiled_kernels[primal.ensure_compiled(*arguments)]
-            return lowered, program.compile_kernel(
-                program.config(), program.get_device_caps(), lowered
-            )
-    except ti.TaichiCompilationError as error:  # only code of plugins causes one
-        raise AntsError(
-            f"Taichi cannot compile a kernel with your code: {last_line(error)}; try it with "
-            "`taichi-ants check FILE`."
-        ) from error
+def _pass(context: Any, place: tuple[int], array: Any) -> None:
+    """Pass an array to a launch."""
+    if isinstance(array, np.ndarray):
+        address, size = array.ctypes.data, array.nbytes
+        context.set_arg_external_array_with_shape(place, address, size, array.shape, 0)
+    else:
+        context.set_arg_ndarray(place, array.arr)
 
 
 def last_line(error: Exception) -> str:
@@ -174,6 +177,8 @@ def kind_of(value: Any) -> tuple[str, int]:
     """Return the name of a Taichi type, and the number of dimensions, 0 for a number."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype.kind}{8 * value.dtype.itemsize}", value.ndim
+    if isinstance(value, ti.Ndarray):
+        return value.dtype.to_string(), len(value.shape)
     if isinstance(value, np.uint64):
         return "u64", 0
     return ("i32" if isinstance(value, (int, np.integer)) else "f32"), 0

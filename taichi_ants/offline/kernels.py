@@ -1,6 +1,7 @@
 """The kernels of offline learning.
 
-A single thread computes each sum, in order, so results do not depend on the number of threads.
+A single thread computes each sum, in order, so results do not depend on the number of threads. The
+last argument, `zero`, is for the guards of `arithmetic.guards`.
 """
 
 import taichi as ti
@@ -34,6 +35,7 @@ def replay(
     n_states: ti.i32,
     learning_rate: ti.f32,
     discount: ti.f32,
+    zero: ti.i32,
 ):
     """Update `q` by Q-learning over the rows of each group, from the first to the last."""
     ti.loop_config(block_dim=1)
@@ -63,6 +65,7 @@ def iterate(
     discount: ti.f64,
     lowest: ti.f64,
     tolerance: ti.f64,
+    zero: ti.i32,
 ):
     """Back up all pairs of each group, until no value changes by more than `tolerance`.
 

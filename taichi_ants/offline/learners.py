@@ -49,12 +49,12 @@ def batch_q_learning(
     groups, rates = np.searchsorted(data.run, runs).astype(np.int32), (learning_rate, discount)
     q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), initial_q, np.float32)
     runtime.start()
-    from taichi_ants.offline.kernels import replay  # imports Taichi
+    from taichi_ants.engines.launch import call  # imports Taichi, as the next line does
+    from taichi_ants.offline.kernels import replay
 
     rows = (data.state, data.action, data.reward, data.next_state, data.terminated.view(np.uint8))
     for _ in range(sweeps):  # one launch per sweep, because a launch cannot be interrupted
-        with runtime.quiet():
-            replay(q.reshape(-1), groups, *rows, data.task.n_states, *rates)
+        call(replay, q.reshape(-1), groups, *rows, data.task.n_states, *rates)
     return q if by_run else q[0]
 
 
@@ -178,15 +178,15 @@ class EmpiricalModel:
         values = np.empty((n_groups, self.n_states))
         greedy = np.zeros((self.n_states, N_ACTIONS)) if policy is None else policy
         runtime.start()
-        from taichi_ants.offline.kernels import iterate  # imports Taichi
+        from taichi_ants.engines.launch import call  # imports Taichi, as the next line does
+        from taichi_ants.offline.kernels import iterate
 
         tables = q.reshape(-1), values.reshape(-1), np.ascontiguousarray(greedy).reshape(-1)
         # Taichi does not accept arrays of length 0.
         after = np.append(self.successors, np.int32(0)), np.append(self.probabilities, 0.0)
         numbers = self.n_states, discount, lowest, tolerance(self.largest, discount, initial_q)
         model = self.groups, self.pairs, rewards, self.begins, *after
-        with runtime.quiet():
-            iterate(*tables, int(policy is None), *model, *numbers)
+        call(iterate, *tables, int(policy is None), *model, *numbers)
         return q
 
 

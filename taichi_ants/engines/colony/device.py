@@ -1,103 +1,22 @@
-"""The arrays of a colony in the memory of a device, such as a GPU, while ticks run.
+"""The arrays of a colony that are on a device, such as a GPU, while ticks run; see `memory`."""
 
-A launch costs microseconds for each argument, and a GPU allows 64. So the device has one array for
-each type of numbers, in which all arrays of this type follow each other. The first entries are what
-kernels read as numbers: those of the model, the place of each array, and its shape.
-"""
+from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping
-from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 from weakref import ref
 
 import numpy as np
 import taichi as ti
-from taichi.lang.impl import expr_init, subscript
 
 from taichi_ants import runtime
+from taichi_ants.engines.colony.memory import Contents, copies
 from taichi_ants.engines.launch import kind_of
 from taichi_ants.errors import AntsError
-from taichi_ants.kernel_functions import Named, while_compiling
 
-# The types of numbers, in the order of the arguments of kernels.
-KINDS = {"i8": np.int8, "u8": np.uint8, "i32": np.int32, "i64": np.int64, "u64": np.uint64}
-KINDS |= {"f32": np.float32, "f64": np.float64}
-MEMORY = {kind: ti.types.ndarray(dtype=getattr(ti, kind), ndim=1) for kind in KINDS}
 _LINE = 128  # an array begins at a multiple of this, as GPUs read memory in lines of 128 bytes
 _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
 _OF_THREADS = "orders", "barrier"  # which only kernels of other schedules read
-
-
-class Contents(NamedTuple):
-    """The numbers that kernels read, by name and kind, and the arrays: name, kind, dimensions."""
-
-    numbers: tuple[tuple[str, str], ...]
-    arrays: tuple[tuple[str, str, int], ...]
-
-    def heads(self) -> dict[str, list[str]]:
-        """Return the names of the numbers at the start of the memory of each kind.
-
-        Those of an array are `NAME.place`, and `NAME.0`, `NAME.1` of its shape.
-        """
-        heads: dict[str, list[str]] = {kind: [] for kind in KINDS}
-        for name, kind in self.numbers:
-            heads[kind].append(name)
-        for name, _, ndim in self.arrays:
-            heads["i32"] += [f"{name}.place", *(f"{name}.{axis}" for axis in range(ndim))]
-        return heads
-
-
-class _Held:
-    """An array in kernels: the part of a memory that begins at a place."""
-
-    def __init__(self, memory: Any, place: Any, shape: tuple[Any, ...]) -> None:
-        self.memory, self.place, self.shape = memory, place, shape
-
-    def __getitem__(self, index: Any) -> Any:
-        if isinstance(index, tuple):
-            row, column = index
-            index = row * self.shape[1] + column
-        return subscript(None, self.memory, self.place + index)
-
-
-@while_compiling
-def number_of(contents: Contents, i32: Any, name: str) -> Any:
-    """Return a whole number from the memory, while a kernel compiles."""
-    return subscript(None, i32, contents.heads()["i32"].index(name))
-
-
-@while_compiling
-def view_of(contents: Contents, *memories: Any) -> Named:
-    """Return the arrays and numbers by name, as rules read them, while a kernel compiles."""
-    of_kinds = dict(zip(KINDS, memories, strict=True))
-    # Read once into variables, because a compiler reads memory again after each write into it.
-    known = {
-        name: expr_init(subscript(None, of_kinds[kind], place))
-        for kind, names in contents.heads().items()
-        for place, name in enumerate(names)
-    }
-    for name, kind, ndim in contents.arrays:
-        shape = tuple(known[f"{name}.{axis}"] for axis in range(ndim))
-        known[name] = _Held(of_kinds[kind], known[f"{name}.place"], shape)
-    return Named(known.__getitem__)
-
-
-@cache
-def _copies(kind: str) -> tuple[Any, Any]:
-    """Return kernels that copy an array into a memory, from a place on, and out of it."""
-    held, given = MEMORY[kind], ti.types.ndarray(dtype=getattr(ti, kind), ndim=1)
-
-    @ti.kernel
-    def copy_in(memory: held, place: ti.i32, array: given):  # type: ignore[valid-type]
-        for i in range(array.shape[0]):
-            memory[place + i] = array[i]
-
-    @ti.kernel
-    def copy_out(memory: held, place: ti.i32, array: given):  # type: ignore[valid-type]
-        for i in range(array.shape[0]):
-            array[i] = memory[place + i]
-
-    return copy_in, copy_out
 
 
 class DeviceArrays(MutableMapping[str, np.ndarray]):
@@ -149,10 +68,8 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
         """Return a copy with the same NumPy arrays, for copies and pickles."""
         return DeviceArrays, ({**self},)
 
-    def on_device(self, numbers: Mapping[str, Any]) -> tuple[Contents, tuple[Any, ...]]:
-        """Return what kernels find on the device, and its memories, up to date.
-
-        After the launch, call `note_launch`.
+    def on_device(self, numbers: Mapping[str, Any]) -> tuple[Contents, dict[str, Any]]:
+        """Return what kernels find on the device, and its memories by kind, for launches now.
 
         Raises:
             AntsError: The colony is too large, or Taichi was reset after the last launch.
@@ -168,11 +85,9 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
         for name in self._changed.difference(_OF_THREADS):
             self._copy(0, name)
         self._changed.clear()
-        return self._contents, tuple(self._memories.values())
-
-    def note_launch(self) -> None:
-        """Take notice that kernels may have changed all arrays on the device."""
-        self._newer = self._places.keys() - self._changed
+        self._newer = {*self._places}
+        # Taichi crashes without a number; this one is that of `arithmetic.guards`.
+        return self._contents, self._memories | {"zero": 0}
 
     def _fetch(self, names: Iterable[str]) -> None:
         """Copy some arrays from the device, if they are newer there."""
@@ -190,7 +105,7 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
 
     def _copy(self, out: int, name: str) -> None:
         kind, place = self._places[name]
-        _copies(kind)[out](self._memories[kind], place, self._arrays[name].reshape(-1))
+        copies(kind)[out](self._memories[kind], place, self._arrays[name].reshape(-1))
 
     def _lay_out(self, numbers: Mapping[str, Any]) -> None:
         """Make memories with room for all numbers and arrays."""
@@ -225,6 +140,7 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
             of_arrays |= {f"{name}.{axis}": n for axis, n in enumerate(shape)}
             of_arrays[f"{name}.place"] = place
         for kind, names in self._contents.heads().items():
-            head = np.array([{**known, **of_arrays}[name] for name in names], KINDS[kind])
+            dtype = f"{kind[0]}{int(kind[1:]) // 8}"
+            head = np.array([{**known, **of_arrays}[name] for name in names], dtype)
             if names:
-                _copies(kind)[0](self._memories[kind], 0, head)
+                copies(kind)[0](self._memories[kind], 0, head)

@@ -3,11 +3,12 @@
 If worlds are many and small, each world is one part of the work. If they are few and large, all
 threads share each phase by chunks, which are ranges of the ants, cells or states of one world, and
 wait for each other at a barrier. On a GPU, each ant, cell or state has a thread, and a phase is a
-parallel loop. All do the same phases in the same order and give the same numbers. The order is that of `taichi_ants.reference.ReferenceColony.tick`.
+parallel loop. All do the same phases in the same order and give the same numbers. The order is that
+of `taichi_ants.reference.ReferenceColony.tick`.
 """
 
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -15,8 +16,16 @@ import taichi as ti
 from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
-from taichi_ants.engines.colony import columns, device, layout, learning, life, own_inputs
-from taichi_ants.engines.colony import steps, trail
+from taichi_ants.engines.colony import (
+    columns,
+    layout,
+    learning,
+    life,
+    memory,
+    own_inputs,
+    steps,
+    trail,
+)
 from taichi_ants.engines.colony.barrier import next_group, part_of, share_of_part
 from taichi_ants.engines.colony.columns import chunks_of, function, share_of
 from taichi_ants.engines.colony.layout import Order, WorldRow
@@ -241,11 +250,9 @@ def launches_of_tick(v: Variant, planning_steps: int) -> list[str]:
 
 
 @cache
-def by_ant(v: Variant, name: str, contents: device.Contents) -> Callable[..., None]:
+def by_ant(v: Variant, name: str, contents: memory.Contents, arguments: Any) -> Callable[..., None]:
     """Return a kernel with a parallel loop for each phase, or for several of a group."""
-    groups: list[Group] = []
-    if name in ONCE:
-        groups += [(Phase(ANTS, ONCE[name]),)]
+    groups: list[Group] = [(Phase(ANTS, ONCE[name]),)] if name in ONCE else []
     if name in ("tick", "first"):
         groups += tick_groups(v)
     if name == "planning":
@@ -253,30 +260,26 @@ def by_ant(v: Variant, name: str, contents: device.Contents) -> Callable[..., No
     if name in ("tick", "last"):
         groups += last_groups(v)
     loops = tuple(
-        (of, tuple(phases)) for group in groups for of, phases in groupby(group, lambda p: p.of)
+        (of, tuple(phases))
+        for group in groups
+        for of, phases in groupby(group, lambda phase: phase.of)
     )
 
     @while_compiling
-    def length_of(of: str, i32: Any) -> Any:
+    def length_of(of: str, numbers: Any) -> Any:
+        number = partial(memory.number_of, contents, numbers)
         each = {ANTS: "n_slots", CELLS: "size"}
-        n = device.number_of(contents, i32, "n_worlds")
-        if of in each:
-            return n * device.number_of(contents, i32, each[of])
-        return n * v.n_rows if of == STATES else n
-
-    memory = device.MEMORY
+        in_world = number(each[of]) if of in each else v.n_rows if of == STATES else 1
+        return number("n_worlds") * in_world
 
     @ti.kernel
-    def advance_colony(
-        i8: memory["i8"], u8: memory["u8"], i32: memory["i32"], i64: memory["i64"],
-        u64: memory["u64"], f32: memory["f32"], f64: memory["f64"],
-    ):  # fmt: skip
+    def advance_colony(c: arguments):
         for of, phases in ti.static(loops):
             ti.loop_config(block_dim=128)
-            for i in range(length_of(of, i32)):
-                c = device.view_of(contents, i8, u8, i32, i64, u64, f32, f64)
+            for i in range(length_of(of, c)):
+                colony = memory.view_of(contents, c)
                 for phase in ti.static(phases):
-                    do_one(phase, c, v, i)
+                    do_one(phase, colony, v, i)
 
     return advance_colony
 

@@ -177,7 +177,7 @@ ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food
 
 BY_ANT = "by_ant"  # the schedule of a GPU
 SCHEDULES = "by_world", "by_chunk", BY_ANT
-_PLACES = 64  # of sums in a world, so that few ants add to the same place at once
+PLACES = 64  # of sums in a world, so that few ants add to the same place at once
 # The number of slots from which threads share a world: a single world, and each of many.
 _LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
 SORTED_BITS = 16  # of the number of a cell, by which ants are sorted
@@ -200,9 +200,8 @@ def schedule_of(given: str | None, n_worlds: int, capacity: int, arch: str) -> s
     return schedule
 
 
-def most_chunks(schedule: str, n_worlds: int, capacity: int, pairs: int, threads: int) -> int:
+def most_chunks(n_worlds: int, capacity: int, pairs: int, most: int) -> int:
     """Return the most chunks of a world, if each has sums for some pairs of state and action."""
-    most = {"by_world": 1, "by_chunk": threads, BY_ANT: _PLACES}[schedule]
     return max(1, min(most, capacity, _MOST_SUMS // max(1, n_worlds * pairs)))
 
 

@@ -5,10 +5,10 @@ tick. The n errors of a pair are summed as 64-bit fixed-point numbers, so that t
 matter. The value moves by weights[n] times their mean, as n successive updates towards one target
 would move it.
 
-Each chunk of ants has its own sums, without atomic operations, unless `v.by_ant`. If a world is one chunk, `touched`
-lists the pairs with updates: their number, then the pairs. Else `touched` marks the states with
-updates, and chunks share the states: each joins the sums of its states into those of the world,
-which come before those of chunks, and applies them.
+Each chunk of ants has its own sums, without atomic operations, unless `v.by_ant`. If a world is one
+chunk, `touched` lists the pairs with updates: their number, then the pairs. Else `touched` marks
+the states with updates, and chunks share the states: each joins the sums of its states into those
+of the world, which come before those of chunks, and applies them.
 """
 
 import taichi as ti

@@ -22,6 +22,7 @@ from taichi_ants.engines.colony.layout import (
     BY_ANT,
     COLUMNS,
     NESTS_BY_KINDS,
+    PLACES,
     SORTED_BITS,
     TALLY_WIDTH,
     TOTALS,
@@ -175,8 +176,11 @@ class ColonyState:
             self.memory = model.learner.memory_for(self.training, task.n_states)
         # The states of all tables that ants of a world share, and the most chunks of a world.
         self._shared_rows = model.n_rows if sharing == "shared" else 0
-        sizes = len(self.seeds), self.capacity, self._shared_rows * ROW, running.threads
-        self.chunks = most_chunks(self.schedule, *sizes)
+        self.chunks = 1
+        if self.schedule != "by_world":
+            places = PLACES if self.schedule == BY_ANT else running.threads
+            sizes = len(self.seeds), self.capacity, self._shared_rows * ROW, places
+            self.chunks = most_chunks(*sizes)
         self.arrays = _no_arrays(self.schedule)
         self.lay_out(worlds)
         self.arrays |= (lasting := self._lasting(table))

@@ -85,7 +85,7 @@ class TickingColony(ColonyState):
 
     _piece = 1  # a number of ticks that takes less than _PIECE_SECONDS
     _sort_seconds = 0.0  # spent on sorting by NumPy
-    _launches = cached_property[dict[str, Any]](lambda colony: {})  # prepared kernels, by name
+    _launches = cached_property[dict[Any, Any]](lambda colony: {})  # prepared kernels, by name
     _choice = cached_property(lambda colony: ThreadChoice())
 
     def begin_episode(
@@ -250,26 +250,24 @@ class TickingColony(ColonyState):
         from taichi_ants.engines.colony import kernels
 
         names = kernels.launches_of_tick(self._variant, self.training.planning_steps)
+        ready, self.ready = self.ready, np.zeros_like(self.ready)  # in case of Ctrl-C
         self._launch_by_ant(names * n)
         self.ticks += n
+        self.ready = ready
 
     def _launch_by_ant(self, names: Sequence[str]) -> None:
         """Launch kernels by name, with a thread for each ant, and wait for the device."""
         import taichi as ti
 
         from taichi_ants.engines.colony import kernels
-        from taichi_ants.engines.launch import DeviceLaunch
+        from taichi_ants.engines.launch import Launch
 
-        numbers = kernel_numbers(self) | {"places": self.chunks}
-        contents, memories = self.arrays.on_device(numbers)
-        for name in dict.fromkeys(names):
+        contents, memories = self.arrays.on_device(kernel_numbers(self) | {"places": self.chunks})
+        for name in names:
             if (name, contents) not in self._launches:
-                kernel = kernels.by_ant(self._variant, name, contents)
-                self._launches[name, contents] = DeviceLaunch(kernel)
-        launches = [self._launches[name, contents] for name in names]
-        self.arrays.note_launch()
-        for launch in launches:
-            launch(memories)
+                kernel_of = partial(kernels.by_ant, self._variant, name, contents)
+                self._launches[name, contents] = Launch(kernel_of)
+            self._launches[name, contents](memories)
         ti.sync()
 
     def _sort(self, parts: int) -> None:

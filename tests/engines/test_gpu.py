@@ -1,0 +1,143 @@
+"""Kernels as they are compiled and launched for a GPU, on the CPU: guards, and equal results."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taichi_ants
+from taichi_ants import evaluate, learners, runtime, train, worlds
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task import Task
+
+PACKAGE = Path(taichi_ants.__file__).parent
+RULES = {
+    "q_learning": Task().replace(choice="softmax"),
+    "sarsa": Task().replace(pheromone={"deposit": "fading"}),
+    "dyna_q": Task().replace(noise={"slip": 0.1, "misread": 0.1}),
+}
+
+
+@pytest.fixture
+def as_on_gpu(monkeypatch):
+    monkeypatch.setattr(runtime, "gpu_kernels_on_cpu", True)
+
+
+def results_of_operators(zero):
+    """Return the results of operators of f32 and f64 in a kernel with guards."""
+    import taichi as ti
+
+    from taichi_ants.arithmetic.guards import guarded
+
+    runtime.start()
+    numbers = ti.types.ndarray(ti.f64, 1)
+
+    @ti.func
+    def computed(x, y):
+        power, vector, scaled, shared = x**2, ti.Vector([x, y]) * y, x, x
+        scaled *= y
+        shared /= y
+        return ti.Vector(
+            [x * y, x / y, x // y, x % y, power, vector[0], (vector / y)[1], scaled, shared]
+        )
+
+    @ti.kernel
+    def kernel(out: numbers, x: ti.f64, y: ti.f64, zero: ti.i32):
+        whole = ti.cast(y, ti.i32) * 10
+        of_f64, of_f32 = computed(x, y), computed(ti.cast(x, ti.f32), ti.cast(y, ti.f32))
+        for i in ti.static(range(9)):
+            out[i], out[9 + i] = of_f64[i], ti.cast(of_f32[i], ti.f64)
+        out[18] = ti.cast(whole / 3, ti.f64)
+        out[19] = ti.cast(whole * 3 + whole // 3 + whole % 3, ti.f64)
+
+    out = np.zeros(20)
+    with runtime.quiet(), guarded(3):
+        kernel(out, 17.3, 2.9, zero)
+    return out
+
+
+def test_guards_hide_products_and_quotients_of_reals_from_the_compiler():
+    x, y = np.float64(17.3), np.float64(2.9)
+    expected = []
+    for a, b in ((x, y), (np.float32(x), np.float32(y))):
+        whole = np.floor(a / b)
+        expected += [a * b, a / b, whole, a - b * whole, a * a, a * b, b * b / b, a * b, a / b]
+    expected += [np.float32(20) / np.float32(3), 20 * 3 + 20 // 3 + 20 % 3]
+    assert results_of_operators(0).tolist() == [float(value) for value in expected]
+    # With another number than 0, all of them change, but not those of whole numbers.
+    changed = results_of_operators(-1) != np.array(expected)
+    assert changed[:-1].all()
+    assert not changed[-1]
+
+
+UNLIKE = """
+import numpy as np, taichi as ti
+from taichi_ants.arithmetic.guards import guarded
+from contextlib import nullcontext
+
+ti.init(arch=ti.cpu, fast_math=True, offline_cache=False, log_level=ti.ERROR)
+numbers = ti.types.ndarray(ti.f64, 1)
+
+def quotients(x, y, z, guards):
+    @ti.kernel
+    def kernel(x: numbers, y: numbers, z: numbers, zero: ti.i32):
+        for i in range(1000):
+            x[i], y[i] = x[i] / z[i] + x[i] / 5.0, y[i] / z[i]
+    x, y = x.copy(), y.copy()
+    with guards:
+        kernel(x, y, z, 0)
+    return x, y
+
+x, y, z = np.random.default_rng(1).random((3, 1000))
+for guards, equal in (nullcontext(), False), (guarded(3), True):
+    first, second = quotients(x, y, z, guards)
+    assert ((first == x / z + x / 5).all() and (second == y / z).all()) is np.bool_(equal), equal
+"""
+
+
+def test_divisors_are_guarded_against_a_compiler_that_multiplies_by_reciprocals(tmp_path):
+    # As that of a CPU does only with fast_math.
+    script = tmp_path / "quotients.py"  # Taichi reads the source of kernels
+    script.write_text(UNLIKE, encoding="utf-8")
+    options = {"TI_ADVANCED_OPTIMIZATION": "1", "PYTHONPATH": str(PACKAGE.parent)}
+    done = subprocess.run(
+        [sys.executable, script], env={**os.environ, **options}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", learners.names())
+def test_training_is_the_same_as_on_a_gpu(name, as_on_gpu, monkeypatch):
+    config = TrainingConfig(name, 0.2, 0.9, 0.3, 0.97, learning_rate_decay=0.99)
+    world, task = worlds.paper(), RULES.get(name)
+    on_gpu = train(world, config, [1, 2], 8, 150, task)
+    values = evaluate(world, on_gpu.q_values, 3, 5, 150, task, epsilon=0.1)
+    monkeypatch.setattr(runtime, "gpu_kernels_on_cpu", False)
+    assert_same(vars(train(world, config, [1, 2], 8, 150, task).state), vars(on_gpu.state))
+    assert_same(vars(evaluate(world, on_gpu.q_values, 3, 5, 150, task, epsilon=0.1)), vars(values))
+
+
+def assert_same(left, right):
+    for name, value in left.items():
+        np.testing.assert_array_equal(value, right[name], err_msg=name)
+
+
+def test_all_kernels_have_guards_on_a_gpu():
+    plain = {}
+    for path in PACKAGE.rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        kernels = len(re.findall(r"^ *@ti.kernel$", text, re.MULTILINE))
+        # A pack has the number for the guards, and the launch of other kernels passes it.
+        unguarded = kernels - len(re.findall(r"\([ac]: arguments\):|    zero: ti.i32,", text))
+        if unguarded:
+            plain[path.relative_to(PACKAGE).as_posix()] = unguarded
+    assert plain == {
+        "engines/colony/memory.py": 2,  # copies
+        "engines/learner_check.py": 2,  # `testing` checks rules and learners on the CPU
+        "engines/own_rules.py": 1,
+        "rendering/raster_kernels.py": 2,  # colours, rounded to whole numbers
+    }
