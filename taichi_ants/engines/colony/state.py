@@ -704,11 +704,13 @@ class ColonyState:
 
         AntsError if the file cannot be used, or its learner or observation is not registered.
         """
-        runtime.start(threads, arch)  # first, because its errors are not about the file
+        running = runtime.start(threads, arch)  # first: its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):
             training = facts["training"] and TrainingConfig(**facts["training"])
             worlds = [World.from_dict(world) for world in facts["worlds"]]
             task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
+            if (options["schedule"] == BY_ANT) != (running.arch == "cuda"):
+                options["schedule"] = None  # of another processor
             if options["sharing"] == "frozen" and training is not None:
                 # Tables of the right shape, which the arrays of the file replace.
                 leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()
