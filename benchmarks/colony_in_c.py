@@ -104,7 +104,7 @@ def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) ->
         "random": arrays["streams"].copy(),
         "q": arrays["q"].copy(),
         "weights": arrays["weights"][np.minimum(np.arange(colony.ants + 1), last)],
-        "rewards": np.array(astuple(colony.task.rewards), np.int32),
+        "rewards": np.array([*astuple(colony.task.rewards), 0], np.int32),
     }
     names = ("evaporates", "slope", "fades_after", "discount")
     in_c = CColony(
@@ -224,7 +224,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add("--threads", type=whole_number(1, 1024), metavar="N", help="use N threads (default: all)")
     about = "fail if a ratio to C is below RATIO"
     add("--least", type=a_ratio, default=0.0, metavar="RATIO", help=about)
-    add("--publish", action="store_true", help="write the table to docs/performance.md")
+    add("--publish", action="store_true", help="write the table to docs/results/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)

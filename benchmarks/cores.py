@@ -146,7 +146,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = Parser(__doc__)
     add = parser.add_argument
     add("--rounds", type=whole_number(1), default=3, metavar="N", help="measure each N times")
-    add("--publish", action="store_true", help="write the table to docs/performance.md")
+    add("--publish", action="store_true", help="write the table to docs/results/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)

@@ -17,7 +17,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.files import read_text, write_text
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "performance.md"
+PAGE = ROOT / "docs" / "results" / "performance.md"
 FIGURES = ROOT / "docs" / "figures"
 
 Work = Callable[[], int]  # does some work, and returns the number of steps in it

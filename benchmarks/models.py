@@ -107,7 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add = parser.add_argument
     add("--ants", type=whole_number(1), default=100_000, metavar="N", help="ants of each colony")
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
-    add("--publish", action="store_true", help="write the table to docs/performance.md")
+    add("--publish", action="store_true", help="write the table to docs/results/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)

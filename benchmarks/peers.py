@@ -209,7 +209,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add = parser.add_argument
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
     add("--small", action="store_true", help="do little work, to test this command")
-    add("--publish", action="store_true", help="write tables and figure to docs/performance.md")
+    add("--publish", action="store_true", help="write them to docs/results/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)

@@ -51,7 +51,7 @@ def faults(colony: Colony) -> list[str]:
     """Return the faults of a colony at the end of a tick, as text."""
     arrays, world = colony.arrays, colony.arrays["worlds"][:, 0]
     taken = arrays["stage"] != Stage.VACANT
-    ants = {name: arrays[name][taken] for name in colony.columns()}
+    ants = {name: arrays[name][taken] for name in colony._columns()}
     cells, numbers, ground = ants["cell"], ants["number"], colony.snapshot().ground
     stored = arrays["nests"][NestRow.STORE, 0] + world[WorldRow.BIRTHS]
     foods = np.count_nonzero(ground == FOOD) + ants["carries"].sum(dtype=int)

@@ -312,7 +312,7 @@ def main(arguments: list[str] | None = None) -> None:
     add("--threads", type=whole_number(1, 1024), default=1, metavar="N", help="use N CPU threads")
     about = "fail if the ratio of a learner to ant.c is below RATIO"
     add("--least", type=a_ratio, default=0.0, metavar="RATIO", help=about)
-    add("--publish", action="store_true", help="write the table to docs/performance.md")
+    add("--publish", action="store_true", help="write the table to docs/results/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)

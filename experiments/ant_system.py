@@ -2,7 +2,7 @@
 
 For each method and world, the script prints the number of colonies that find a shortest path from
 the queen to food, and the median of the iterations in which they find it. It also prints the mean
-length of the ants' tours in the first and the last iteration. See docs/baselines.md.
+length of the ants' tours in the first and the last iteration. See docs/models/index.md.
 """
 
 # No `from __future__ import annotations`, because Taichi reads the annotations of kernels.
@@ -203,7 +203,7 @@ def search(
     """Return results of independent colonies that search for the shortest path to food.
 
     The methods are Ant System (Dorigo, Maniezzo and Colorni 1996) and MAX-MIN Ant System (Stuetzle
-    and Hoos 2000); for their rules and papers, see docs/baselines.md. Every ant walks at random
+    and Hoos 2000); for their rules and papers, see docs/models/index.md. Every ant walks at random
     from the queen until it reaches food. Its walk without loops is its *tour*.
 
     With "ant_system", all ants deposit. With "max_min", the best ant of the iteration does, and tau

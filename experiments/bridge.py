@@ -3,7 +3,7 @@
 Colonies learn on a bridge with branches of 23 and 36 steps. The script evaluates them on that
 bridge, on its mirror image, on one with equal branches, and on one whose short branch opens late.
 It prints the share of ants that cross by the short branch, without food and with it, and writes
-counts and two figures to a folder. See docs/bridge.md.
+counts and two figures to a folder. See docs/results/bridge.md.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 `study` trains and evaluates 1 to 64 ants under several rules in several kinds of worlds with many
 seeds, and writes tables, figures and findings to a folder. `live` runs a colony of any size, or
-many in parallel, and can save, resume and draw it. See docs/colony_study.md.
+many in parallel, and can save, resume and draw it. See docs/results/foraging.md.
 
 To add rules, name them in `colony_series.toml`, and add an entry to `TASKS`. To add a kind of
 world, name it there, and extend `world_of`.
@@ -102,8 +102,8 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     kinds.add_parser("live", help="run one colony, or many in parallel")
     add = parser.add_argument
     text = (
-        "kinds of world, explained in docs/colony_study.md; ants train in paper, open and piles, "
-        "and ants trained in open are evaluated in all others"
+        "kinds of world (see docs/results/foraging.md); ants train in paper, open and piles, and "
+        "ants trained in open are evaluated in all others"
     )
     world_kinds: dict[str, Any] = {"nargs": "+", "choices": tuple(WORLDS), "metavar": "NAME"}
     add("--world-kinds", **world_kinds, default=tuple(WORLDS), help=text)

@@ -2,7 +2,7 @@
 
 The script trains ants with each learner and combination of hyperparameters (or others), compares
 the results with the paper and with exact bounds, and writes tables, figures and policies to a
-folder. See docs/paper.md.
+folder. See docs/results/paper.md.
 """
 
 from __future__ import annotations
@@ -84,8 +84,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--planning-steps", **several, default=(3, 5), help=planning)
     add("--world", default="paper", metavar="WORLD", help=command_line.WORLDS)
     quick = (
-        f"use at most {QUICK_SEEDS} seeds and draw no animations: a first look at the results, "
-        "whose intervals are wide"
+        f"use at most {QUICK_SEEDS} seeds: a first look at the results, whose intervals are wide"
     )
     command_line.add_study(parser, "compare", quick)
     parser.open_settings, parser.own_settings = ("world", "training"), _FIXED
@@ -106,7 +105,6 @@ class Plan:
     study: Study
     world_name: str  # for readers
     exact: process.Begun  # waits for the exact bounds
-    renders: bool  # whether figures come with animations
 
 
 def plan(options: Mapping[str, Any]) -> Plan:
@@ -142,7 +140,7 @@ def plan(options: Mapping[str, Any]) -> Plan:
     study = Study(tuple(points), seeds, arrays, measured)
     discounts = tuple(dict.fromkeys(options["discounts"]))
     exact = process.begin(bounds.bound_rows, world, points[0].task, discounts, points[0].max_steps)
-    return Plan(study, name, exact, renders=not options["quick"])
+    return Plan(study, name, exact)
 
 
 def variants(
@@ -235,7 +233,7 @@ def tables(plan: Plan, results: Results) -> str:
     chosen = [trained(study, row, run, arch) for row, run in examples(comparison)]
     seen: Callable[[], Seen] = Seen
     if results.figures:
-        seen = page.begin(comparison, baselines, chosen, folder, renders=plan.renders)
+        seen = page.begin(comparison, baselines, chosen, folder)
 
     summaries = summarise(comparison)
     lines, audit = table2(comparison, summaries), assess(comparison)

@@ -1,7 +1,8 @@
 """Draw the three small pictures of the README, each for light and for dark pages.
 
 The pictures show the results in `results/compare`, which the script makes first if they are
-missing, and a table of docs/foraging.md. The script prints the numbers that the README states.
+missing, and a table of docs/results/foraging.md. The script prints the numbers that the README
+states.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ def winners(results: Path) -> np.ndarray:
 
 def deliveries() -> dict[str, tuple[int, int]]:
     """Return deliveries in the paper's world by rules: learned, and with a policy by hand."""
-    page = (ROOT / "docs" / "foraging.md").read_text("utf-8")
+    page = (ROOT / "docs" / "results" / "foraging.md").read_text("utf-8")
     found = re.findall(r"\| (.+): learned \| (\d+) .*\n\| fixed \| (\d+) ", page)
     return {rules: (int(learned), int(fixed)) for rules, learned, fixed in found}
 

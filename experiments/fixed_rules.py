@@ -5,7 +5,7 @@ All ants follow `trail_follower`, a rule written by hand, and explore with the r
 seeds, the worst seed, the tick of the first delivery, and the share of blocked moves. Worlds, seeds
 and random numbers are those of the evaluation in `colony.py study`. With --study, it also prints
 the deliveries of that study's ants, and the difference, learned minus fixed, paired by seed. See
-docs/fixed_rules.md.
+docs/results/foraging.md.
 """
 
 from __future__ import annotations

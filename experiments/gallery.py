@@ -2,8 +2,9 @@
 
 The scripts `render.py`, `learning.py` and `policy_sheet.py` draw the pictures in `renders/`. The
 pictures in `docs/figures/` show the results in `results/compare`, `results/colony` and
-`results/bridge`. If results are missing, the script runs the study first. The comparison takes less
-than a minute on two cores; see docs/colony_study.md and docs/bridge.md for the other two.
+`results/bridge`. If results are missing, the script runs the study first. The comparison takes
+less than a minute on two cores; see docs/results/foraging.md and docs/results/bridge.md for the
+other two.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 For each ratio r of the branch lengths, the script prints the share of colonies in each class of the
 share of ants on the short branch. It also prints the published shares and the standard error. In
-the last rows, the short branch opens late. See docs/baselines.md.
+the last rows, the short branch opens late. See docs/models/index.md.
 """
 
 # No `from __future__ import annotations`, because Taichi reads the annotations of kernels.
@@ -109,7 +109,7 @@ def choices(
     It leaves one mark of its branch at the end where it chooses, and one at the other end when it
     arrives. Marks do not evaporate. The short branch takes 20 seconds, the long one 20 r: 10 and
     10 r cells of 2 seconds each. An ant is in the first cell when it chooses and in the last when
-    it arrives. `docs/research_notes.md` compares readings of the paper.
+    it arrives.
 
     `short` and `long` are the steps to cross the branches, see `crossing_steps`. `ants` is the
     number of choices, and even: ants choose in turn at the nest, first, and at the food. The first

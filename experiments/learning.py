@@ -1,7 +1,7 @@
 """Render an ant before and after learning, side by side.
 
 Without --seed, the script trains many ants, each alone with its own seed, and shows the one that is
-closest to the median at all --checkpoints. It writes a GIF. See docs/rendering.md.
+closest to the median at all --checkpoints. It writes a GIF. See docs/how-to/pictures.md.
 """
 
 from __future__ import annotations

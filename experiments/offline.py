@@ -5,7 +5,7 @@ the share of greedy rollouts that deliver, for each behaviour policy that record
 of transitions and offline learner, and for online Q-learning after as many transitions. Table (b)
 shows how well three methods of off-policy evaluation rank ten policies. Table (c) has the
 deliveries of colonies that follow policies learned from data of ants that live for ever, or that
-are born and die. See docs/offline_study.md.
+are born and die. See docs/results/offline.md.
 """
 
 from __future__ import annotations

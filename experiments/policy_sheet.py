@@ -2,7 +2,7 @@
 
 There is one part for foraging and one for carrying, or a single part if state names have no task.
 States are ordered by the cell ahead, then by the other cells in view. The policy is that of a file,
-or of an ant that the script trains first. See docs/rendering_reference.md.
+or of an ant that the script trains first. See docs/reference/rendering.md.
 """
 
 from __future__ import annotations

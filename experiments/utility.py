@@ -5,7 +5,7 @@ with their 95 % interval over seeds, and the tick of the first delivery. The oth
 the path of a colony, a walk from the nest to food and back that always follows the highest utility.
 They are the number of colonies that ever had a shortest path, and the median of the ticks when they
 first had it. The last two columns are the mean length of paths at the end, as a multiple of the
-shortest, and the number of colonies with a path. See docs/baselines.md.
+shortest, and the number of colonies with a path. See docs/models/index.md.
 """
 
 # No `from __future__ import annotations`, because Taichi reads the annotations of kernels.
@@ -213,7 +213,7 @@ def forage(
         U_p(s) <- max(U_p(s), R_p(s) + discount * max over the neighbours s' of U_p(s')),
 
     where the reward R_p is 1 in a cell of goal p, else 0. Then it moves to the neighbour with the
-    highest utility of the other goal. `docs/baselines.md` lists sources and deviations.
+    highest utility of the other goal. `docs/models/index.md` lists sources and deviations.
 
     All `ants` of a colony start in the nest, which has room for all; a cell has room for
     `capacity`. `evaporation` is the share of utilities that evaporates per tick. `exploration` is

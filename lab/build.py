@@ -10,9 +10,14 @@ from __future__ import annotations
 import base64
 import json
 import re
+import runpy
 import sys
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
+
+from taichi_ants.live.server import PARTS
+from taichi_ants.viewer.page import assemble, part
 
 LAB = Path(__file__).parent
 DOCS = LAB.parent / "docs"
@@ -31,7 +36,8 @@ class Page(NamedTuple):
     most_bytes: int
 
 
-_SHARED = ("worlds", "engine", "link", "geometry", "looks", "run", "story", "shapes", "draw")
+_ENGINE = ("worlds", "engine", "link")
+_SHARED = (*_ENGINE, "geometry", "looks", "run", "story", "shapes", "draw")
 _LAB = (
     *("plot", "mind", "scenes", "daily", "brush", "controls", "train", "address", "film"),
     *("embed", "main"),
@@ -50,10 +56,22 @@ PAGES = {
         ("page/base.css", "article/article.css"),
         (
             *(f"page/{name}.js" for name in (*_SHARED, "scenes")),
-            *(f"article/{name}.js" for name in ("pieces", "article")),
+            *(f"article/{name}.js" for name in ("pieces", "world", "article")),
         ),
         _COLONY,
         500_000,
+    ),
+    "lessons.html": Page(
+        "lessons/lessons.html",
+        ("page/base.css", "article/article.css", "lessons/lessons.css"),
+        (
+            *(f"page/{name}.js" for name in (*_SHARED, "mind", "scenes")),
+            *(f"article/{name}.js" for name in ("pieces", "world")),
+            *("lessons/random.js", "../docs/lessons/page/room.js"),
+            *("../docs/lessons/page/experiments.js", "lessons/lessons.js"),
+        ),
+        {**_COLONY, "ANT_WASM": "ant.wasm"},
+        400_000,
     ),
 }
 FONTS = LAB / "page" / "fonts"
@@ -92,6 +110,10 @@ def page(name: str) -> str:
         "SCRIPT": f"const BINARIES = {json.dumps(binaries)};\n{script(one.modules)}",
     }
     whole = (LAB / one.markup).read_text("utf-8")
+    if name == "lessons.html":
+        text = runpy.run_path(str(DOCS / "lessons" / "page" / "text.py"))
+        contents, chapters = text["lessons"](DOCS / "lessons")
+        whole = whole.replace("<!-- CONTENTS -->", contents).replace("<!-- LESSONS -->", chapters)
     for key, text in parts.items():
         whole = whole.replace(f"/* {key} */", text)
     if (size := len(whole.encode())) > one.most_bytes:
@@ -99,7 +121,27 @@ def page(name: str) -> str:
     return whole
 
 
+def live_page() -> str:
+    """Return the live page of the package with a worker in place of the server."""
+    controls, style, _socket, *scripts = (part(name, "taichi_ants.live") for name in PARTS)
+    worker = script((*(f"page/{name}.js" for name in _ENGINE), "live/worker.js"))
+    headers = (LAB / "live" / "headers.json").read_text("utf-8").strip()
+    constants = {
+        "WORKER": json.dumps(f"{worker}\nserve();"),
+        "COLONY": json.dumps(base64_of(LAB / "engine" / "colony.wasm")),
+        "HEADERS": headers,
+    }
+    lines = (f"const {name} = {text};" for name, text in constants.items())
+    transport = (LAB / "live" / "transport.js").read_text("utf-8")
+    scripts = [transport, *lines, *scripts]
+    whole = assemble("Taichi Ants, live", controls=controls, style=style, script="\n".join(scripts))
+    # The worker is a part of the page, and compiles WebAssembly.
+    return whole.replace("script-src '", "worker-src blob:; script-src 'wasm-unsafe-eval' '", 1)
+
+
+BUILDS = {**{name: partial(page, name) for name in PAGES}, "live.html": live_page}
+
 if __name__ == "__main__":
-    for name in PAGES:
-        (DOCS / name).write_text(page(name), encoding="utf-8")
+    for name, build in BUILDS.items():
+        (DOCS / name).write_text(build(), encoding="utf-8")
         sys.stdout.write(f"{DOCS / name}: {(DOCS / name).stat().st_size:,} bytes\n")

@@ -193,7 +193,7 @@ def _begun(scene: dict[str, Any], capacity: int) -> Colony:
     )
     colony.begin_episode()
     if colony.learns:
-        colony.set_learning_rate(scene["rate"] * scene["learns"])
+        colony._set_learning_rate(scene["rate"] * scene["learns"])
     return colony
 
 
@@ -249,8 +249,8 @@ def state_hash(colony: Colony) -> str:
     )
     ants = zip(cells, headings, carry, streams, strict=True)
     words = [word for cell, h, load, s in ants for word in (cell << 8 | h << 1 | load, s)]
-    stored, clock = colony.stored_pheromone(0, 0)
+    stored, clock = colony._stored_pheromone(0, 0)
     levels = np.maximum(stored.astype(np.int64) - clock, 0)
-    words += (levels << 8 | (colony.part("ground", 0) & 15)).tolist()
+    words += (levels << 8 | (colony._part("ground", 0) & 15)).tolist()
     words += colony.q_values[0].view(np.uint32).ravel().tolist()
     return f"{hash_of(colony.ticks, *words):016x}"

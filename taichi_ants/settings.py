@@ -29,10 +29,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, replace
 from functools import cache, partial, reduce, wraps
-from inspect import signature
+from inspect import Signature, cleandoc, signature
 from numbers import Real
+from textwrap import fill
 from types import NoneType, UnionType
 from typing import (
+    TYPE_CHECKING,
     Annotated,
     Any,
     ClassVar,
@@ -155,6 +157,23 @@ class DeclaredSetting(NamedTuple):
             default = str(default).lower()
         return "; ".join(parts) + ("" if default is MISSING else f" (default: {default})")
 
+    @property
+    def in_words(self) -> tuple[str, str, str]:
+        """The allowed values, the default and the meaning, as tables and docstrings show them."""
+        rule = self.rule
+        default = self.default if rule.usual is None else rule.usual
+        if default is MISSING:
+            default = "required"
+        elif default is None or self.kind is Named:
+            default = "none" if self.kind in (list, Named) else "off"
+        else:
+            default = f"`{self.kind.__name__}()`" if self.is_group else f"`{default!r}`"
+        unit = f", in {rule.unit}" if rule.unit else ""
+        only = ""
+        if rule.only is not None:
+            only = f"; only with `{rule.only[0]}` {_either(map(repr, rule.only[1:]))}"
+        return self.allowed + unit, default, rule.help + only
+
     def checked(self, value: Any) -> Any:
         """Return a value as a Python object of the setting's kind; AntsError if not allowed."""
         word = self.kind is not str and isinstance(value, str) and value == "none"
@@ -231,6 +250,41 @@ class DeclaredSetting(NamedTuple):
         return " and ".join(words)
 
 
+def _is_ready(cls: type) -> bool:
+    """Return whether a class of settings is a dataclass yet; `dataclass` sets this name last."""
+    return "__match_args__" in vars(cls)
+
+
+class _Signature:
+    """The arguments of a class of settings, with their types, but without declarations."""
+
+    def __get__(self, _: object, cls: Any) -> Signature:
+        if not _is_ready(cls):
+            raise AttributeError("__signature__")
+        hints = get_type_hints(cls.__init__)
+        _, *arguments = signature(cls.__init__).parameters.values()
+        return Signature(
+            [one.replace(annotation=hints.get(one.name, one.annotation)) for one in arguments]
+        )
+
+
+class _Documentation:
+    """The docstring of a class of settings, followed by its settings as they are declared."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def __get__(self, _: object, cls: type) -> str:
+        if not _is_ready(cls) or not declared(cls):
+            return self._text
+        lines = [cleandoc(self._text), "", "Attributes:"]
+        for setting in declared(cls):
+            values, default, meaning = setting.in_words
+            line = f"{setting.name}: {meaning}; {values} (default: {default})."
+            lines.append(fill(line, 100, initial_indent=" " * 4, subsequent_indent=" " * 8))
+        return "\n".join(lines)
+
+
 class Settings:
     """Base of the classes of settings, which are frozen dataclasses.
 
@@ -249,13 +303,18 @@ class Settings:
     def __init_subclass__(cls, path: str = "", **more: Any) -> None:
         super().__init_subclass__(**more)
         cls.path = path or cls.path
+        if cls.__doc__:
+            cls.__doc__ = _Documentation(cls.__doc__)  # type: ignore[assignment]
 
-    def __new__(cls, /, *values: Any, **named: Any) -> Any:
-        known = [field.name for field in fields(cls)]  # type: ignore[arg-type]
-        for name in named:  # Python's own message has no path and no similar names
-            if name not in known:
-                raise AntsError(f"`{_below(cls.path, name)}` {not_a_setting(name, known)}")
-        return super().__new__(cls)
+    if not TYPE_CHECKING:  # type checkers and editors read the fields
+        __signature__ = _Signature()
+
+        def __new__(cls, /, *values: Any, **named: Any) -> Any:
+            known = [field.name for field in fields(cls)]
+            for name in named:  # Python's own message has no path and no similar names
+                if name not in known:
+                    raise AntsError(f"`{_below(cls.path, name)}` {not_a_setting(name, known)}")
+            return super().__new__(cls)
 
     def __post_init__(self) -> None:
         self.check()

@@ -65,7 +65,7 @@ def test_a_package_index_shows_no_broken_links(built):
         shown = wheel.read(name).decode().split("\n\n", 1)[1]
     assert len(re.findall(r"\]\((?!https?:)", (ROOT / "README.md").read_text("utf-8"))) > 20
     assert shown.startswith("# Taichi Ants")
-    assert "(`docs/paper.md`)" in shown
+    assert "(`docs/results/paper.md`)" in shown
     assert re.findall(r"\]\((?!https?:)", shown) == []
     assert "<" not in re.sub(r"<!-- tests -->|<repository address>", "", shown)  # no HTML
 

@@ -239,7 +239,7 @@ def test_sentences(make, says):
 
 
 def test_the_page_of_settings_is_made_from_the_declarations():
-    page = (ROOT / "docs" / "settings.md").read_text()
+    page = (ROOT / "docs" / "reference" / "settings.md").read_text()
     for kind in KINDS:
         assert table(kind) in page
     for rule in RULES.built_in.values():

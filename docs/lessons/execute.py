@@ -143,8 +143,9 @@ def write_editions(path: Path, folder: Path) -> None:
         (folder / edition).mkdir(parents=True, exist_ok=True)
         nbformat.write(notebook, folder / edition / path.name)
         print(folder / edition / path.name)
-    for page in set(re.findall(r"\]\(\.\./([\w.]+)", path.read_text(encoding="utf-8"))):
-        shutil.copy(FOLDER.parent / page, folder)  # the lab, for example
+    for page in set(re.findall(r"\]\(\.\./([\w./-]+)", path.read_text(encoding="utf-8"))):
+        (folder / page).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(FOLDER.parent / page, folder / page)  # the lab, for example
     (folder / "teachers" / IMAGES).mkdir(exist_ok=True)
     for picture in (path.parent / IMAGES).glob(f"lesson-{path.stem[0]}-*.png"):
         shutil.copy(picture, folder / "teachers" / IMAGES)

@@ -15,12 +15,12 @@ from paper import figures, process, report
 from paper.baselines import Baseline
 from paper.claims import Audit, headlines
 from paper.comparison import DEFINITIONS, Comparison, counts
-from paper.table2 import Line, example_name, summarise_behaviours
+from paper.table2 import Line, summarise_behaviours
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
-from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
+from taichi_ants.rendering import Episode
 from taichi_ants.report.page import Picture, Player, ShownFinding, Statement, Statements, fill
 from taichi_ants.studies.command_line import progress_bar
 from taichi_ants.studies.points import RunPoint
@@ -28,7 +28,6 @@ from taichi_ants.task import Task
 from taichi_ants.viewer import record_trace
 
 STEPS = 80  # the longest recording; a delivery takes 34 steps, walking to and fro on the trail 38
-SIZE = 720, 480  # of animations
 
 
 class Example(NamedTuple):
@@ -69,9 +68,8 @@ def begin(
     baselines: Sequence[Baseline],
     examples: Sequence[Example],
     folder: Path,
-    renders: bool,
 ) -> Callable[[], Seen]:
-    """Return a function that waits for all figures, recordings and, if `renders`, animations.
+    """Return a function that waits for all figures and recordings.
 
     This process follows the policies, because it has compiled the kernel. The second process begins
     with the figures, for which it does not start Taichi; this one begins with the last calls.
@@ -79,12 +77,6 @@ def begin(
     played = [example.played() for example in examples]
     drawn = process.begin(figures.save_all, comparison, baselines, folder / "figures")
     calls: dict[Any, process.Begun] = {"figures": drawn}
-    for (row, run, point, *_), episode in zip(examples, played if renders else (), strict=False):
-        path = folder / "renders" / f"{example_name(comparison, row, run)}.gif"
-        # The animation shows the name of the episode next to the world.
-        named = replace(episode, name=BEHAVIOURS[comparison.behaviours[row, run]])
-        title = f"{comparison.rows[row].variant.label}, {point.task.delivery}"
-        calls[path] = process.begin(render, path, named, title)
     first: dict[int, tuple[Example, Episode]] = {}
     for example, episode in zip(examples, played, strict=True):
         first.setdefault(int(comparison.behaviours[example.row, example.run]), (example, episode))
@@ -112,11 +104,6 @@ def begin(
         return Seen(results["figures"], players, sheet)
 
     return wait
-
-
-def render(path: Path, episode: Episode, title: str) -> None:
-    """Write an animation of an episode."""
-    save_animation(path, frames(episode.snapshots(), SIZE, title=title), pause=PAUSE)
 
 
 def comparison_page(

@@ -27,7 +27,7 @@ from taichi_ants.measures.finished import WINDOW
 
 WIDTH = 79  # columns of the narrowest common terminal
 MOST_LINES = 12  # of the table in the report of one screen
-# With fewer, a note warns about intervals of means; docs/statistics.md has their coverage.
+# With fewer, a note warns about intervals of means; docs/concepts/statistics.md has their coverage.
 FEW_SEEDS = 50
 APART = "!"  # marks a mean outside of the interval of the IQM
 MIXED = "+ the runs behave in different ways, so their mean describes none of them."
@@ -170,7 +170,7 @@ def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
         notes += [
             f"Few seeds ({seeds}): if one run in a hundred is an outlier, most intervals of the "
             "mean miss the true mean. Intervals of the IQM are valid from 10 seeds on "
-            "(docs/statistics.md)."
+            "(docs/concepts/statistics.md)."
         ]
     starred = [
         f"  {line.label}, {line.delivery}: {line.summary.row.point.label}"

@@ -1,4 +1,4 @@
-/* pieces.js: the ten worlds of the article. Each has one control, and one number that is measured; no DOM is needed. */
+/* pieces.js: the ten worlds of the article, and one of a lesson. Each has one control, and one number that is measured; no DOM is needed. */
 
 import { Engine, PARTS, RULES } from "../page/engine.js";
 import { longShare, wallPath } from "../page/scenes.js";
@@ -85,6 +85,12 @@ export const PIECES = {
     ask: "Pay for a step along the way", options: [[0, "nothing"], [1, "1 point"], [3, "3 points"], [10, "10 points"]], from: 3,
     unit: "loads in 1 000 ticks", ticks: 1000, speed: 3, seed: 8, points: true,
     start: (shaping) => ({ scene: { world: PAPER, rules: RULES.paper, level: 250, ants: 4, discount: 0.99, shaping }, skip: TRAINED }),
+  },
+  rules: { // of a lesson
+    ask: "Rules", options: [[RULES.paper, "the paper’s"], [PARTS.directed, "A: a trail with a direction"], [PARTS.directed | PARTS.rightOfWay, "A and B: right of way"],
+      [RULES.foraging, "A, B and C: ants in view"]], from: 3,
+    unit: "loads in 1 000 ticks", ticks: 1000, speed: 4, seed: 17,
+    start: (rules) => ({ scene: { rules } }),
   },
 };
 

@@ -21,6 +21,9 @@ enum { LEVEL_AT = 4, NO_LEVEL = 1 << LEVEL_AT };
 /* Bits in the effect of an action; above them is the reward + 1 of one that exchanges no food. */
 enum { ENTERS = 1, EXCHANGES = 2, REWARD_AT = 2 };
 
+#ifndef NOTE
+#define NOTE(ant, terminated, value) /* ant_page.c writes steps down */
+#endif
 #define INLINE static inline __attribute__((always_inline))
 #define LEVEL(level) (((level) + 1) * NO_LEVEL)
 
@@ -245,6 +248,7 @@ INLINE int learn(const Shared *shared, Ant *ant, int learner)
         next_value = next->values[ant->action];
     }
     update(ant, &row->values[ant->taken], ant->reward, terminated, next_value);
+    NOTE(ant, terminated, row->values[ant->taken]);
     if (learner == DYNA_Q)
         plan(ant, ant->taken, terminated, job->planning_steps);
     else

@@ -1,4 +1,21 @@
 /* Lone ants for a page: training runs of ant.c, in the world of the paper. */
+#include <stdint.h>
+
+/* A step of the first run, in the order of STEP in engine.js: the cell and heading after it, and
+ * the value of the pair of observation and action after the ant has learned from it. */
+typedef struct {
+    int32_t episode, step, state, action, reward, next, terminated, cell, heading;
+    float value;
+} Note;
+
+static Note *notes;
+static int n_notes, most_notes;
+
+#define NOTE(ant, ends, entry)                                                                   \
+    if (n_notes < most_notes)                                                                    \
+    notes[n_notes++] = (Note){(ant)->episode, (ant)->step, (ant)->state, (ant)->taken,           \
+                              (ant)->reward, (ant)->next, (ends), (ant)->cell, (ant)->heading,   \
+                              (entry)}
 #include "ant.c"
 #include "grid.h"
 
@@ -42,20 +59,33 @@ EXPORT uint64_t *prepare(int n, int episodes)
     return (uint64_t *)memory;
 }
 
+/* The address of the tables that runs begin with, (n, 128, 5). */
+EXPORT float *tables(void) { return job.q; }
+
+/* Make room for notes of so many steps, after `prepare`, which has freed those of the call before;
+ * return their address. There must be one run. */
+EXPORT Note *note_steps(int most)
+{
+    notes = malloc(most * sizeof(Note));
+    n_notes = 0, most_notes = notes ? most : 0;
+    return notes;
+}
+
+EXPORT int steps_noted(void) { return n_notes; }
+
 /* Train the runs that are prepared; return the address of their tables, then returns, steps and
- * deliveries; or NULL if out of memory. */
+ * deliveries; or NULL if out of memory. Each run draws from the stream of its seed, a purpose and a
+ * number. */
 EXPORT float *train_all(int learner, double rate, double discount, double epsilon, double decay,
-                        double first, int planning_steps, int truncates, int max_steps)
+                        int planning_steps, int truncates, int max_steps, int purpose, int number)
 {
     Grid grid = grid_of(10, 10, 10);
     const uint64_t *seeds = (uint64_t *)memory;
     make_world(&grid);
     job.learner = learner, job.planning_steps = planning_steps;
     job.delivery_truncates = truncates, job.max_steps = max_steps;
-    for (int i = 0; i < job.n * N_STATES * N_ACTIONS; i++)
-        job.q[i] = (float)first;
     for (int i = 0; i < job.n; i++)
-        runs[i] = (Run){.random = stream_of(seeds[i], STREAM_ANT, 0), .epsilon = epsilon,
+        runs[i] = (Run){.random = stream_of(seeds[i], purpose, number), .epsilon = epsilon,
                         .decay = decay, .min_epsilon = epsilon < 0.01 ? epsilon : 0.01,
                         .learning_rate = (float)rate, .discount = (float)discount,
                         .cell = cell_at(&grid, -8, 0), .heading = 0};

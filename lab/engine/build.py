@@ -1,7 +1,7 @@
 """Build colony.wasm and ant.wasm from C, with clang and lld: python lab/engine/build.py
 
-It also writes the tables of lab/page/worlds.js from the package: the worlds, and the best actions
-of the hand-written policy.
+It also writes, from the package, the tables of lab/page/worlds.js (the worlds, and the best actions
+of the hand-written policy) and lab/live/headers.json (facts about the frames of each set of rules).
 
 The files are committed, with their checksums and the compiler in built.json, so that a page needs
 no compiler. Other compilers make other bytes with the same results, which tests compare.
@@ -14,12 +14,19 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+from taichi_ants.lab import RULES, decoded, played
 from taichi_ants.learners.policies import trail_follower
+from taichi_ants.viewer.frames import SECTIONS
+from taichi_ants.viewer.recorder import Recorder
 from taichi_ants.worlds import lab
 
 ENGINE = Path(__file__).resolve().parent
 WORLDS = ENGINE.parent / "page" / "worlds.js"
+HEADERS = ENGINE.parent / "live" / "headers.json"
+CELLS = [name for name, kind in SECTIONS.items() if kind == "cell"]
+FIRST_SCREEN = "AQAPVUAeZIQHAQrYBAEC"  # its code
 SOURCES = {"colony.wasm": "page.c", "ant.wasm": "ant_page.c"}
 FLAGS = (
     *("-O3", "-std=c11", "-ffp-contract=off", "-fno-vectorize", "-fno-slp-vectorize"),
@@ -55,9 +62,25 @@ def with_tables(script: str) -> str:
     return script[:begin] + "\n".join(["/* GENERATED */", *lines, "};", ""]) + script[end:]
 
 
+def headers() -> dict[str, Any]:
+    """Return the headers of frames by rules, without facts about a scene, and the states' names."""
+    rules, names = {}, {}
+    for number in RULES:
+        scene, _ = decoded(FIRST_SCREEN)
+        header = Recorder(played({**scene, "rules": number, "ants": 1}, [], 0)).header()
+        names[header["n_states"]] = header.pop("names")
+        types = {name: "cell" if name in CELLS else kind for name, kind in header["types"].items()}
+        observation = dict(header["about"])["observation"]
+        for name in ("title", "ranges", "about"):
+            del header[name]
+        rules[number] = {**header, "types": types, "observation": observation}
+    return {"rules": rules, "names": names}
+
+
 if __name__ == "__main__":
     facts = build(clang=sys.argv[1] if len(sys.argv) > 1 else "clang")
     (ENGINE / "built.json").write_text(json.dumps(facts, indent=2) + "\n")
+    HEADERS.write_text(json.dumps(headers(), separators=(",", ":")) + "\n", "utf-8")
     WORLDS.write_text(with_tables(WORLDS.read_text("utf-8")), "utf-8")
     for name in SOURCES:
         print(f"{name}: {(ENGINE / name).stat().st_size} bytes")

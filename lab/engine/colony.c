@@ -45,7 +45,7 @@ enum {
 
 enum { EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13 };
 enum { LEFT, FORWARD, RIGHT, PICK_UP, GIVE, N_ACTIONS };
-enum { ENTERED_EMPTY, FAILED, ENTERED_CUE, PICKED_UP, DELIVERED };
+enum { ENTERED_EMPTY, FAILED, ENTERED_CUE, PICKED_UP, DELIVERED, PUSHED };
 enum { SEES_CUE = 2, ROW = 8, N_HEADINGS = 6 };
 /* What the ant on a cell wants: nothing, to enter the cell at a heading, to take the food there. */
 enum { ENTER = 1, STANDS = 7, TAKE = 9, MARK = 15 };
@@ -69,7 +69,7 @@ typedef struct {
     float discount;
     uint64_t explore_below;
     const float *weights;   /* (n + 1) */
-    const int32_t *rewards; /* (5) in the order of the fields of Rewards, as events are here */
+    const int32_t *rewards; /* (6) in the order of the fields of Rewards, as events are here; 0 */
     int64_t counts[4];      /* the results: returns, deliveries, moves, blocked */
     int32_t regrowth;       /* ticks until food is back; only read if there are `sources` */
     int32_t sources;        /* number of food sources */
@@ -420,7 +420,7 @@ INLINE void act(const Colony *c, const Work *w, int rules, Ant *ant, int tick, i
                 came = 1 + towards;
                 goes = cell + c->steps[came];
                 filled = 1;
-                event = ENTERED_EMPTY;
+                event = PUSHED;
                 if ((rules & QUEUES) && moves && ant->heading == towards) {
                     enters = 1; /* it wanted to go there */
                     event = ant->event;

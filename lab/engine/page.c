@@ -28,6 +28,15 @@ static struct {
     int32_t mind[16];
 } page;
 
+/* A frame of frames.c, what the frames before it have sent, and what one with actions needs. */
+static struct {
+    uint8_t *bytes, *known, *ahead, *sent_ground;
+    uint16_t *rows;
+    int32_t *numbers, *sent_numbers, *sent_trail, *updates;
+    float *before, *sent_q;
+    int sent_n, sent_queen;
+} frame;
+
 static uint8_t *is_source, *painted;
 static int32_t *start_cells; /* all cells in the order in which ants take them */
 static uint64_t *keys;
@@ -47,7 +56,7 @@ static size_t share_memory(void)
     W.wants = memory ? wants + margin(&C) : NULL;
     C.ground = part(&n, cells), C.trail = part(&n, 4 * cells), C.closer = part(&n, cells);
     C.q = part(&n, 4 * pairs), C.weights = part(&n, 4 * (most + 1));
-    C.rewards = part(&n, 4 * 5);
+    C.rewards = part(&n, 4 * 6);
     C.source_at = part(&n, 4 * cells), C.taken = part(&n, 4 * cells);
     W.ants = part(&n, most * sizeof *W.ants), W.greedy = part(&n, C.states * sizeof *W.greedy);
     W.errors[0] = part(&n, pairs * sizeof **W.errors), W.pairs[0] = part(&n, 4 * (pairs + 2));
@@ -58,6 +67,12 @@ static size_t share_memory(void)
     page.cells = part(&n, 4 * most), page.before = part(&n, 4 * most);
     page.before2 = part(&n, 4 * most), page.states = part(&n, 2 * most);
     page.headings = part(&n, most), page.looks = part(&n, most);
+    frame.known = part(&n, C.states), frame.ahead = part(&n, most);
+    frame.rows = part(&n, 2 * most), frame.sent_ground = part(&n, cells);
+    frame.numbers = part(&n, 4 * most), frame.sent_numbers = part(&n, 4 * most);
+    frame.sent_trail = part(&n, 4 * cells), frame.updates = part(&n, 4 * pairs);
+    frame.before = part(&n, 4 * pairs), frame.sent_q = part(&n, 4 * pairs);
+    frame.bytes = part(&n, 24 * most + 13 * cells + 12 * pairs + 120000);
     return n;
 }
 
@@ -105,7 +120,7 @@ EXPORT void set_rate(double rate)
 EXPORT void set_numbers(int level, int slope, double discount, double epsilon, int shaping,
                         int regrowth)
 {
-    const int32_t rewards[5] = {0, -1, shaping, 3, 10};
+    const int32_t rewards[6] = {0, -1, shaping, 3, 10, 0};
     memcpy((int32_t *)C.rewards, rewards, sizeof rewards);
     C.level = level, C.slope = slope, C.fades_after = slope ? (level + slope - 1) / slope : 0;
     C.discount = (float)discount, C.explore_below = (uint64_t)(epsilon * 4294967296.0);
@@ -199,6 +214,8 @@ static void look(void)
 /* Set the table to the values that the page has written; FROZEN ants act by it. */
 EXPORT void read_values(void) { note_best(&C, &W); }
 
+static void begin_frames(void);
+
 /* Start: `first` is the first value of all actions in all states. */
 EXPORT void begin(uint32_t low, uint32_t high, int n, float first)
 {
@@ -221,10 +238,11 @@ EXPORT void begin(uint32_t low, uint32_t high, int n, float first)
                     below(stream_of(seed, STREAM_START_HEADING, C.n) >> 32, N_HEADINGS),
                     stream_of(seed, STREAM_ANT, C.n));
     interventions = stream_of(seed, STREAM_INTERVENTION, 0);
+    begin_frames();
     look();
 }
 
-EXPORT void pass(int ticks)
+EXPORT __attribute__((noinline)) void pass(int ticks)
 {
     for (int end = tick + ticks; tick < end;) {
         for (int i = 0; i < C.n; i++)
@@ -307,6 +325,7 @@ EXPORT void set_ants(int n)
     for (int k = 0; k < n_start_cells && C.n < n; k++)
         if (C.ground[start_cells[k]] == EMPTY) {
             interventions = advance(interventions);
+            frame.numbers[C.n] = next_number;
             add_ant(start_cells[k], below(bits_of(interventions) >> 32, N_HEADINGS),
                     stream_of(seed, STREAM_BORN, next_number++));
         }
@@ -320,7 +339,7 @@ EXPORT void *array(int k)
 {
     void *all[] = {C.ground, page.ground, page.levels, page.traffic, page.brush,
                    page.cells, page.before, page.before2, page.headings, page.looks,
-                   page.states, C.q, page.mind};
+                   page.states, C.q, page.mind, frame.bytes};
     return all[k];
 }
 
@@ -380,3 +399,5 @@ EXPORT uint32_t hash_state(int half)
         }
     return (uint32_t)hash;
 }
+
+#include "frames.c"

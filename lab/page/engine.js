@@ -40,8 +40,10 @@
  * LONE ANTS (ant.wasm)
  *   const lone = new LoneAnts(module)
  *   lone.train({ learner, rate, discount, epsilon, decay, planningSteps, truncates, seeds, episodes,
- *                maxSteps }) -> { returns, steps, deliveries }, each Int32Array (seeds * episodes);
+ *                maxSteps, notes }) -> { returns, steps, deliveries }, each Int32Array (seeds * episodes);
  *   lone.values   the tables of the last call, Float32Array (seeds * 640)
+ *   lone.notes    of one seed, its first steps (at most `notes`), each an object with NOTES
+ *   lone.follow(tables, { seeds, rollout, maxSteps, notes })   the same for ants that only follow their tables
  *   GRID is the paper's grid, 128 settings for `train`; 100 seeds of one take about 0.2 s
  */
 
@@ -297,21 +299,36 @@ export const GRID = [["q_learning", 0], ["sarsa", 0], ["dyna_q", 3], ["dyna_q", 
     [0.3, 0.5].flatMap((epsilon) => [0.99, 0.995].map((decay) =>
       ({ learner, planningSteps, truncates, rate, discount, epsilon, decay })))))));
 
+// What is noted of a step. Cell and heading are those after it, and the value is that of the entry which the step has changed.
+const NOTES = ["episode", "step", "state", "action", "reward", "next", "terminated", "cell", "heading", "value"];
+
 export class LoneAnts {
   /** @param {WebAssembly.Module} module ant.wasm */
   constructor(module) { this.wasm = /** @type {any} */ (new WebAssembly.Instance(module, {}).exports); }
 
   /** Train one setting of GRID with several seeds; see the top of this file. */
-  train({ learner, rate, discount, epsilon, decay, planningSteps = 0, truncates = false, first = 0, seeds, episodes = 500, maxSteps = 600 }) {
-    const n = seeds.length, all = n * episodes, at = this.wasm.prepare(n, episodes);
-    if (!at) throw new Error("There is too little memory.");
+  train({ learner, rate, discount, epsilon, decay, planningSteps = 0, truncates = false, first = 0, seeds, episodes = 500, maxSteps = 600,
+          tables = null, purpose = 0, rollout = 0, notes = 0 }) {
+    const n = seeds.length, all = n * episodes, at = this.wasm.prepare(n, episodes), noted = this.wasm.note_steps(notes);
+    if (!at || !noted) throw new Error("There is too little memory.");
     new BigUint64Array(this.wasm.memory.buffer, at, n).set(seeds.map(BigInt));
+    const start = new Float32Array(this.wasm.memory.buffer, this.wasm.tables(), n * 640);
+    if (tables) start.set(tables);
+    else start.fill(first);
     const number = ["q_learning", "sarsa", "dyna_q"].indexOf(learner);
-    const done = this.wasm.train_all(number, rate, discount, epsilon, decay, first, planningSteps, truncates, maxSteps);
+    const done = this.wasm.train_all(number, rate, discount, epsilon, decay, planningSteps, truncates, maxSteps, purpose, rollout);
     if (!done) throw new Error("There is too little memory.");
     const memory = this.wasm.memory.buffer; // it may have grown
     this.values = new Float32Array(memory, done, n * 640).slice();
     const [returns, steps, deliveries] = [0, 1, 2].map((k) => new Int32Array(memory, done + 4 * (n * 640 + k * all), all).slice());
+    const whole = new Int32Array(memory, noted, NOTES.length * this.wasm.steps_noted()), exact = new Float32Array(memory, noted, whole.length);
+    this.notes = Array.from({ length: this.wasm.steps_noted() }, (_, k) => Object.fromEntries(NOTES.map((name, j) =>
+      [name, (name === "value" ? exact : whole)[k * NOTES.length + j]])));
     return { returns, steps, deliveries };
+  }
+
+  /** Let ants follow their tables for an episode, without learning: the rollouts of the package, as long as trails stay. */
+  follow(tables, { seeds, rollout = 0, maxSteps = 600, notes = 0 }) {
+    return this.train({ learner: "q_learning", rate: 0, discount: 0.9, epsilon: 0, decay: 1, seeds, episodes: 1, maxSteps, tables, purpose: 1, rollout, notes });
   }
 }

@@ -28,7 +28,7 @@ function codesOf(engine, state) {
 const valuesOf = (engine, state) => [...engine.values.subarray(8 * state, 8 * state + 5)];
 
 /** A view and its five values, as a drawing. @param {number[]} view load, and three codes */
-function glyph(view, values, look) {
+export function glyph(view, values, look) {
   const [load, ...codes] = view;
   const low = Math.min(...values), high = Math.max(...values), same = high - low < 1e-6;
   const cells = codes.map((code, k) => {

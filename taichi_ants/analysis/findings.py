@@ -22,7 +22,7 @@ from taichi_ants.errors import count
 
 SIMULTANEOUS_LEVEL = 0.95
 # With fewer, intervals cover less than their level and are too wide for a verdict; see
-# docs/statistics.md.
+# docs/concepts/statistics.md.
 LEAST_SEEDS = 10
 UNBOUNDED = (-np.inf, np.inf)
 

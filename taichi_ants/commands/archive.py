@@ -2,7 +2,7 @@
 
 FOLDER is a folder of finished results. The archive has the folder, with the runs and all files that
 the study has read, the versions of all packages, and a description of the model. See
-docs/archives.md.
+docs/how-to/clusters.md.
 """
 
 from __future__ import annotations

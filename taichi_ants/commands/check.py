@@ -3,7 +3,7 @@
 The command loads a Python file. It compares each rule in kernels with its Python twin, for drawn
 inputs and in drawn colonies, and each observation in drawn colonies, bit by bit. Each learner
 learns for 2000 steps while Taichi checks indices. The command prints a line for each, and exits
-with status 1 if one has a fault. See docs/rules.md and docs/learners.md.
+with status 1 if one has a fault. See docs/how-to/models.md and docs/how-to/models.md.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 FILE is an archive that `taichi-ants archive` wrote. The command computes the study again in a new
 folder, and prints a line for each file. It exits with status 1 if a file differs. See
-docs/archives.md.
+docs/how-to/clusters.md.
 """
 
 from __future__ import annotations

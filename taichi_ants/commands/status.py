@@ -1,7 +1,7 @@
 """Show what is done, what failed, and how long is left in folders of results.
 
 The command reads only files, so it also works while another process, or another machine with the
-same disk, computes. See docs/many_machines.md.
+same disk, computes. See docs/how-to/clusters.md.
 """
 
 from __future__ import annotations

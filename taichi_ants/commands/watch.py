@@ -3,7 +3,7 @@
 The command prints the address of a page, which opens only on this machine. On the page, you choose
 the world, the rules and the policy, run the colony, and place or remove rocks, food, trails and
 ants. You can save the session, which replays bit for bit. To end, press Ctrl-C or choose "Quit the
-server" on the page. See docs/watching.md.
+server" on the page. See docs/how-to/colonies.md.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from functools import cache
 from itertools import accumulate
@@ -20,6 +20,7 @@ from taichi_ants.arithmetic.guards import guarded
 from taichi_ants.errors import AntsError
 
 _ARRAYS = np.ndarray, ti.Ndarray
+_ZERO = "zero"  # the number in packs for the guards
 
 
 class Launch:
@@ -46,6 +47,7 @@ class Launch:
         """Launch with these values; names and types are always the same, arrays C-contiguous."""
         if self._taichi() is not ti.lang.impl.get_runtime():
             runtime.start()  # the caller may have reset Taichi
+            check_not_lost(values.values())
             self._prepare(values)
         for name, value in values.items():
             if self._known[name] is not value:
@@ -74,7 +76,7 @@ class Launch:
         for_gpu = runtime.compiles_for_gpu()
         self._renews = for_gpu or any(isinstance(value, ti.Ndarray) for value in values.values())
         if for_gpu:
-            values = {**values, "zero": 0}
+            values = {**values, _ZERO: 0}
         kind = _pack_type(tuple((name, *kind_of(value)) for name, value in values.items()))
         taichi = ti.lang.impl.get_runtime()
         program, kernel = taichi.prog, self._kernel_of(kind)._primal
@@ -116,6 +118,29 @@ class Launch:
         if isinstance(value, _ARRAYS) and not self._renews:
             _pass(self._context, self._places[name], value)
         self._known[name] = value
+
+
+def has_guards(arguments: Any) -> bool:
+    """Return whether a kernel with this type of pack is compiled for a GPU."""
+    return _ZERO in arguments.members
+
+
+def on_device(array: np.ndarray) -> Any:
+    """Return a copy of an array that stays in the memory of the device between launches."""
+    copy = ti.ndarray(getattr(ti, _kind(array)[0]), array.shape)
+    copy.taichi = ref(ti.lang.impl.get_runtime())
+    with runtime.quiet():
+        copy.from_numpy(array)
+    return copy
+
+
+def check_not_lost(values: Iterable[Any]) -> None:
+    """Raise AntsError if Taichi was reset after one of the values came to the device."""
+    running = ti.lang.impl.get_runtime()
+    if any(getattr(value, "taichi", lambda: running)() is not running for value in values):
+        raise AntsError(
+            "Taichi was reset, which destroys the state of environments on a GPU; create them again."
+        )
 
 
 def call(kernel: Any, *arguments: Any) -> None:

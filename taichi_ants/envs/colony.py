@@ -79,7 +79,7 @@ class ColonyWorlds(Ants):
     def step(self, actions: np.ndarray) -> None:
         """Take the actions of all ants, integers 0 to 4; worlds at their end do not change."""
         colony = self.colony
-        colony.stop(self.over())
+        colony._stop(self.over())
         self.acted = colony.living & colony.running[:, None]
         colony.act(actions)
         events = np.where(self.acted, colony.events, Event.NONE)

@@ -114,7 +114,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
     """An ant on a hexagonal grid that searches for food and carries it to its queen.
 
     The rules are those of "Ants and Reinforcement Learning Algorithms"; see
-    `docs/environments_reference.md`, also for what codes in observations mean.
+    `docs/reference/environments.md`, also for what codes in observations mean.
 
     ## Spaces
     Observations have k parts of sizes p1, ..., pk, which depend on the task. The paper's have the

@@ -194,8 +194,8 @@ def _constants(state: State) -> dict[str, np.ndarray]:
     for w, nest in np.ndindex(len(nests), state.n_nests):
         n = int(np.count_nonzero(nests[w] == nest))
         chances.append(np.cumsum(chances_in(state.task.castes, nest, n)))
-    rows = numbers_of_castes(state.model.features).values()
-    weights = [state.update_weights(caste.learning_rate or 0.0) for caste in castes]
+    rows = numbers_of_castes(state._model.features).values()
+    weights = [state._update_weights(caste.learning_rate or 0.0) for caste in castes]
     longest = max(map(len, weights))
     return {
         # By number and caste, f64.
@@ -250,7 +250,7 @@ def _newborn(state: State, w: int, nests: np.ndarray, draw: Callable[[int], np.n
     if len(state.task.castes) == 1:
         return {}
     drawn = (draw(len(nests)) >> np.uint64(32)) / 2.0**32
-    bounds = state.part("caste_chances", w).reshape(state.n_nests, -1)[nests, :-1]
+    bounds = state._part("caste_chances", w).reshape(state.n_nests, -1)[nests, :-1]
     return {"caste": np.count_nonzero(bounds <= drawn[:, None], axis=1)}
 
 
@@ -294,8 +294,16 @@ CASTES = Feature(
     policies=_policies,
     without_files=_without_policies,
     arrays=(
-        Array("caste", ANT, "i1", "castes", "i4"),
-        Array("caste_deliveries", CASTE, "i4", "caste_deliveries", "i4", unit="items"),
+        Array("caste", ANT, "i1", "castes", "i4", doc="Number of the caste"),
+        Array(
+            "caste_deliveries",
+            CASTE,
+            "i4",
+            "caste_deliveries",
+            "i4",
+            unit="items",
+            doc="Deliveries of each caste in this episode",
+        ),
     ),
     of_castes={
         "epsilon": _own("epsilon"),

@@ -27,7 +27,7 @@ class Choice(Settings, path="task.choice"):
 
     Only colonies support "deneubourg", which needs no action values, and the names of your rules,
     see `taichi_ants.rules`. "deneubourg" compares levels of the outbound cue; for ants with food,
-    those of `carriers_follow` or a homing pheromone. See `docs/colony.md`.
+    those of `carriers_follow` or a homing pheromone. See `docs/concepts/world_and_ants.md`.
     """
 
     sentences: ClassVar[dict[str, str]] = {

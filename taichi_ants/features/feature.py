@@ -44,6 +44,7 @@ class Array(NamedTuple):
         start: The value at the start of an episode, and where no ant is.
         instead: The array that the attribute shows if a colony does not need this one; "" for 0.
         always: Whether kernels have the array, with one entry, if the model does not need it.
+        doc: The docstring of the attribute, without type and shape.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Array(NamedTuple):
     start: int = 0
     instead: str = ""
     always: bool = False
+    doc: str = ""
 
 
 class Mark(NamedTuple):

@@ -65,10 +65,10 @@ def _faults(task: Task) -> Iterator[str]:
 
 def _refusals(state: State) -> Iterator[str]:
     for world in state.worlds:
-        if world.n_food_kinds > state.model.n_kinds:
+        if world.n_food_kinds > state._model.n_kinds:
             yield (
                 f"the world has {count(world.n_food_kinds, 'kind')} of food, but the task "
-                f"{state.model.n_kinds}; add the others to `task.foods`."
+                f"{state._model.n_kinds}; add the others to `task.foods`."
             )
 
 
@@ -85,7 +85,7 @@ def _numbers(task: Task) -> np.ndarray:
 def _counts(state: State) -> dict[str, np.ndarray]:
     """Return the deliveries by nest and kind of food, (W, nests, kinds)."""
     by_nest_and_kind, shape = state.deliveries, (len(state.seeds), state.n_nests, -1)
-    if state.model.counts_by_nest_and_kind:
+    if state._model.counts_by_nest_and_kind:
         by_nest_and_kind = state.arrays["deliveries_by_nest_and_kind"]
     return {"deliveries_by_nest_and_kind": by_nest_and_kind.astype("i4").reshape(shape)}
 
@@ -103,7 +103,7 @@ def _shown(state: State, w: int, slots: np.ndarray, is_food: np.ndarray) -> dict
 FOODS = Feature(
     Food,
     uses=lambda task: True,
-    spaces={NEST_AND_KIND: lambda state: state.n_nests * state.model.n_kinds},
+    spaces={NEST_AND_KIND: lambda state: state.n_nests * state._model.n_kinds},
     arrays=(Array("deliveries_by_nest_and_kind", NEST_AND_KIND, "i4"),),
     faults=_faults,
     refusals=_refusals,
@@ -152,8 +152,8 @@ HELD = Feature(
     Food,
     uses=lambda task: len(task.foods) > 1 or any(one.loads > 1 for one in task.foods.values()),
     arrays=(
-        Array("kind", ANT, "i1", "kinds", "i4"),
-        Array("kind_of", CELL, "u1", "food_kinds", always=True),
+        Array("kind", ANT, "i1", "kinds", "i4", doc="Kind of the food that the ant carries"),
+        Array("kind_of", CELL, "u1", "food_kinds", always=True, doc="Kind of the food in the cell"),
         Array("loads", CELL, "i4", words="food", unit="loads", always=True),
     ),
     filled=lambda state, kinds: {"kind_of": kinds, "loads": _numbers(state.task)[_LOADS, kinds]},

@@ -44,7 +44,7 @@ _NONE, _FIXED, _UNIFORM, _NORMAL, _LOGNORMAL = range(len(DISTRIBUTIONS))
 class Labour(Settings, path="task.labour"):
     """The rule by which ants start and stop foraging; by default, they always forage.
 
-    `sentences` describe the rule "thresholds". See `docs/colony.md`.
+    `sentences` describe the rule "thresholds". See `docs/concepts/world_and_ants.md`.
     """
 
     sentences: ClassVar[dict[str, str]] = {

@@ -41,7 +41,7 @@ class TrainingConfig(Settings, path="training"):
 
     learner: Annotated[
         str,
-        Setting("name of the learner, such as sarsa or q_learning; see docs/learners_reference.md"),
+        Setting("name of the learner, such as sarsa or q_learning; see docs/reference/learners.md"),
     ]
     # Smaller step sizes could underflow to zero in float32.
     learning_rate: Annotated[
@@ -65,8 +65,10 @@ class TrainingConfig(Settings, path="training"):
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
 
-    def __new__(cls, *values: Any, **named: Any) -> TrainingConfig:
-        return object.__new__(cls)  # further names are hyperparameters
+    if not TYPE_CHECKING:
+
+        def __new__(cls, *values: Any, **named: Any) -> TrainingConfig:
+            return object.__new__(cls)  # further names are hyperparameters
 
     def __init__(
         self,

@@ -39,7 +39,7 @@ LEARNS, FOLLOWS = "learn ", "file "  # prefixes of the names of policies
 BY_HAND = "by hand"
 _NEEDED = {"ants", "map", "policy", "seed", "settings", "size", "ticks", "world", "world_seed"}
 
-# With these settings, 64 ants learn to forage together in 60 episodes; see docs/foraging.md.
+# 64 ants learn to forage together with these in 60 episodes; see docs/results/foraging.md.
 _LEARNING: dict[str, Any] = {
     **{"learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3, "epsilon_decay": 0.92},
     **{"learning_rate_decay": 0.95, "min_learning_rate": 0.01, "initial_q": 10.0},

@@ -81,7 +81,8 @@ class Controls {
     on("next-episode", "click", () => live.edit({ episode: {} }, live.nextStroke()));
     on("files", "click", (event) => {
       const kind = event.target.dataset.export;
-      if (!kind) return;
+      if (kind && !live.choices) this.keep();
+      if (!kind || !live.choices) return;
       this.busy("Making the file …");
       live.ask("export", { kind });
     });
@@ -109,7 +110,8 @@ class Controls {
   fill() {
     const { choices, chosen } = this.live, options = (pairs) =>
       pairs.map(([value, words]) => `<option value="${safe(value)}">${safe(words)}</option>`).join("");
-    if (!this.filled) {
+    document.body.classList.toggle("alone", !choices); // without a server that could do the rest
+    if (choices && !this.filled) {
       this.filled = "yes";
       byId("world-name").innerHTML = options(Object.entries(choices.worlds));
       byId("task").innerHTML = options([...Object.entries(choices.tasks).map(([name, { words }]) => [name, words]), ["", "other settings"]]);
@@ -121,19 +123,24 @@ class Controls {
       byId("map").value = MAP;
       byId("map").maxLength = choices.most.text;
     }
+    if (choices) this.refill(chosen);
+    this.connected(true);
+    this.held.clear(); // all sliders show the values of this session
+    this.hold(false);
+    this.hush();
+  }
+
+  /* Select the choices of the session, but keep the input if another page begins one. */
+  refill(chosen) {
     const fields = [...byId("chosen").elements], typed = fields.map(({ value, checked }) => ({ value, checked }));
     this.choose(chosen);
-    if (this.touched && !this.begins) { // keep the input if another page begins a session
+    if (this.touched && !this.begins) {
       fields.forEach((field, place) => (field.type === "checkbox" ? (field.checked = typed[place].checked) : (field.value = typed[place].value)));
       this.showWorld();
       this.explain();
     } else this.touched = false;
     if (this.begins && !this.roomy.matches) byId("new").open = false;
     this.begins = false;
-    this.connected(true);
-    this.held.clear(); // all sliders show the values of this session
-    this.hold(false);
-    this.hush();
   }
 
   choose(chosen) {
@@ -273,7 +280,7 @@ class Controls {
       box.dataset.names = names;
       box.innerHTML = Object.entries(values).map(([name, one]) => {
         const words = SLIDERS[name] ?? safe(name.replace(".", ": ").replaceAll("_", " ")), about = `id="set-${name}" data-name="${name}"`;
-        const path = EXPLAINS[name] ?? one.path, setting = this.live.choices.settings.find((other) => other.path === path);
+        const path = EXPLAINS[name] ?? one.path, setting = this.live.choices?.settings.find((other) => other.path === path);
         const field = isSwitch(one) ? `<label class="rule"><input type="checkbox" ${about}> ${words}</label>`
           : `<label class="slider" for="set-${name}"><span>${words}</span><output for="set-${name}"></output><input type="range" ${about}></label>`;
         return `<div class="field">${field}${helpOf(words, one.help || (setting?.help ?? "living ants, also at the start of later episodes"))}</div>`;
@@ -395,7 +402,7 @@ class Controls {
     if (file.size > MOST_UPLOAD) this.say("This file is too large to be a session.", true);
     else {
       this.busy("Reading the session …");
-      this.live.socket.send(await file.arrayBuffer());
+      this.live.transport.send(await file.arrayBuffer());
     }
     byId("upload").value = "";
   }

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
 
-SCRIPTS = ("token.js", "source.js", "tools.js", "controls.js")  # a part uses those before it
+SCRIPTS = ("socket.js", "source.js", "tools.js", "controls.js")  # a part uses those before it
 PARTS = ("controls.html", "live.css", *SCRIPTS)
 
 HOST = "127.0.0.1"

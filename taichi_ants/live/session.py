@@ -114,7 +114,7 @@ class Session:
         self._snapshot_time = -math.inf  # of the last snapshot, in seconds
         self.interventions.length = setup.ticks_per_episode or None
         self.interventions.begin_episode()
-        self.colony.observe([])  # has no effect, but compiles kernels for the first edit
+        self.colony._observe([])  # has no effect, but compiles kernels for the first edit
         # The title must not contain the number of ants, because interventions change it.
         title = f"Ants in a world of {self.colony.grid.count} cells"
         self.recorder = Recorder(self.colony, title=title)

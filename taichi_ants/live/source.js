@@ -1,4 +1,5 @@
-/* The live simulation as a source of the viewer, over one socket, see live/server.py.
+/* The live simulation as a source of the viewer, over one transport: a socket to live/server.py, or a
+   worker that answers as it does.
 
    The page acknowledges frames after drawing them. The server sends fewer frames to a slow or hidden
    page, and later a complete one.
@@ -7,7 +8,7 @@
    automatically, but asks before it replaces its history with another session. */
 
 const PAGE = document.documentElement.outerHTML; // before scripts change it
-const LIVE_SCRIPT = "/* The secret of the address"; // start of the live page's scripts, in token.js
+const LIVE_SCRIPT = "/* The transport"; // start of the live page's scripts
 const FIRST_RETRY = 500, LAST_RETRY = 15_000; // milliseconds
 const CUT_OFF = 1008; // the server has closed the socket because of an invalid request
 
@@ -28,25 +29,23 @@ class Live {
   }
 
   get open() {
-    return this.socket.readyState === WebSocket.OPEN;
+    return this.transport.readyState === WebSocket.OPEN;
   }
 
   connect() {
     clearTimeout(this.timer);
-    const socket = new WebSocket(`ws://${location.host}/socket?token=${encodeURIComponent(TOKEN)}`);
-    const on = (kind, act) => socket.addEventListener(kind, (event) => this.socket === socket && act(event));
-    this.socket?.close();
-    this.socket = socket;
+    const transport = openTransport(), mine = (act) => (event) => this.transport === transport && act(event);
+    this.transport?.close();
+    this.transport = transport;
     this.joins = true; // until the server sends the session
     this.ended = false;
-    socket.binaryType = "arraybuffer";
-    on("message", ({ data }) => (typeof data === "string" ? this.hear(JSON.parse(data)) : this.take(data)));
-    on("close", (event) => this.lose(event));
+    transport.onmessage = mine(({ data }) => (typeof data === "string" ? this.hear(JSON.parse(data)) : this.take(data)));
+    transport.onclose = mine((event) => this.lose(event));
   }
 
   /* Find out why there is no connection: "lost" or "ended", which are retried; "no token", "cut off", or "another" session. */
   lose({ code, reason }) {
-    const why = TOKEN === "" ? "no token" : code === CUT_OFF ? "cut off" : this.differs ? "another" : this.ended ? "ended" : "lost";
+    const why = !this.transport.permit ? "no token" : code === CUT_OFF ? "cut off" : this.differs ? "another" : this.ended ? "ended" : "lost";
     this.waiting = this.begins = null;
     this.arrived = 0;
     this.running = this.stands = false;
@@ -67,7 +66,7 @@ class Live {
   }
 
   ask(what, more = {}) {
-    if (this.open) this.socket.send(JSON.stringify({ do: what, ...more }));
+    if (this.open) this.transport.send(JSON.stringify({ do: what, ...more }));
   }
 
   /* Edits of one stroke are undone together. */
@@ -111,7 +110,7 @@ class Live {
     this.joins = false;
     if (comesBack && session !== this.session) {
       this.differs = true;
-      this.socket.close();
+      this.transport.close();
       return;
     }
     this.retry = FIRST_RETRY;

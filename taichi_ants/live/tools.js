@@ -154,7 +154,7 @@ class Tools {
       this.edit("trail", { level: history.pheromone.strongest, ...this.field() }, cells.filter((cell) => ground[cell] !== OBSTACLE));
     } else if (this.name === "ants") this.edit("add_ants", {}, free.filter((cell) => ground[cell] === EMPTY));
     else {
-      this.edit("remove_ants", {}, cells.filter((cell) => taken.has(cell)));
+      if (this.live.choices) this.edit("remove_ants", {}, cells.filter((cell) => taken.has(cell)));
       this.edit("clear", {}, free.filter((cell) => ground[cell] !== EMPTY));
       this.edit("trail", { level: 0, ...this.field() }, cells.filter((cell) => trail[cell] > 0));
     }

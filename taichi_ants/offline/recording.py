@@ -127,7 +127,7 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
     owner = (run, slot)[: tables.ndim - 2]
     state, agent = colony.states[acting], colony.numbers[acting]
     values = tables[(*owner, state)]
-    if colony.model.draws_next_action:
+    if colony._model.draws_next_action:
         known = colony.next_actions[acting] >= 0
         values = np.where(known[:, None], before[(*owner, state)], values)
     colony.tick()

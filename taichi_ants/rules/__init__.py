@@ -1,6 +1,6 @@
 """Rules that you write: the choice of an action, deposits, evaporation and rewards.
 
-See `docs/rules.md`, and `register` for the form of a rule.
+See `docs/how-to/models.md`, and `register` for the form of a rule.
 """
 
 from taichi_ants.features.rule import Parameters, Rule, get, names

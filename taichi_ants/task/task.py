@@ -35,7 +35,7 @@ class Traffic(Settings, path="task.traffic"):
 
     `sentences` describe the settings. A pushed ant gets the reward of a move onto an empty cell.
     With `follow`, all ants of a queue move at once, but a ring of ants does not move. See
-    `docs/colony.md`.
+    `docs/concepts/world_and_ants.md`.
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -346,7 +346,7 @@ def fetching() -> Task:
     """Return the paper's task without its reward for moves onto a trail or nearer to the queen.
 
     An episode of one ant rewards only one pick-up and one delivery. Therefore circling does not
-    pay, and the best policy delivers, at discounts from 0.9 to 0.999 (`docs/environments.md`).
+    pay, and the best policy delivers, at discounts from 0.9 to 0.999 (`docs/how-to/train_an_agent.md`).
     """
     return Task(rewards=Rewards(shaping=0))
 

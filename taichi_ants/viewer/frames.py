@@ -48,7 +48,7 @@ SECTIONS = {
     "kinds": "u1",  # kinds of the food in cells; empty with one kind
     "queens": "cell",  # cells of the queens by nest; empty if they are those of the previous frame
     "trail_at": "cell",
-    "trail": "level",  # expiry clocks, or levels, see `Colony.stored_pheromone`
+    "trail": "level",  # expiry clocks, or levels, see `Colony._stored_pheromone`
     # (owner * n_states + state) * 5 + action; the owner is an ant, or the nest of ants that share.
     "table_at": "f8",
     "table": "f4",

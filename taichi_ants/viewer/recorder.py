@@ -46,7 +46,7 @@ class Recorder:
         expect("title", title, str)
         self.colony, self._title, self._follow = colony, title, follow
         self.grid, self._n_states = colony.snapshot().grid, colony.task.n_states
-        self._learns, owners = colony.sharing != "frozen", colony.owners
+        self._learns, owners = colony.sharing != "frozen", colony._owners
         dense = (one.dense for one in colony.pheromones)
         self.types = types_of(self.grid.size, self._n_states, *dense)
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables that were sent
@@ -199,7 +199,7 @@ class Recorder:
         colony, slots = self.colony, self._living()
         states, numbers = colony.states[0, slots], colony.numbers[0, slots]
         before, ahead = self._tables(), np.zeros(len(slots), bool)
-        if colony.model.draws_next_action:
+        if colony._model.draws_next_action:
             ahead = colony.next_actions[0, slots] >= 0
         colony.tick()
         # Slots of ants that died still hold their data.
@@ -259,7 +259,7 @@ class Recorder:
         sections["cells"] = snapshot.ant_cells[order]
         carrying, nests = snapshot.ant_carries[order], snapshot.ant_nests[order]
         sections["poses"] = snapshot.ant_headings[order] + 8 * carrying + 16 * nests
-        if colony.task.castes or colony.model.n_kinds > 1:
+        if colony.task.castes or colony._model.n_kinds > 1:
             foods = np.maximum(snapshot.ant_foods[order], 0)
             sections["groups"] = snapshot.ant_castes[order] + 16 * foods
         if self._marks:
@@ -276,7 +276,7 @@ class Recorder:
         rates = (colony.epsilon, colony.learning_rate)
         delivered = colony.delivered[0] + totals[0]
         counts = (len(numbers), delivered, self.ticks)
-        stored = [colony.stored_pheromone(0, n) for n in range(len(colony.pheromones))]
+        stored = [colony._stored_pheromone(0, n) for n in range(len(colony.pheromones))]
         clocks = [clock for _, clock in stored]
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, *clocks)
         sections["progress"], self._new = self._new, []

@@ -88,7 +88,7 @@ def outcomes(world: World) -> list[float]:
 
 
 def test_under_the_papers_rewards_the_best_policy_delivers_only_at_low_discounts() -> None:
-    """The numbers on docs/environments.md."""
+    """The numbers on docs/how-to/train_an_agent.md."""
     assert outcomes(worlds.paper()) == pytest.approx([45, 34, 45, 476])
     bounds = EpisodeBounds(worlds.paper(), Task())
     best = [bounds.optimal(discount, 600)[1].deliveries for discount in (0.961, 0.962)]

@@ -3,7 +3,7 @@
 Trains thousands of seeds of a few of the paper's configurations. The mean and the interquartile
 mean (IQM) of such a pool are taken for the truth; from it, 10 to 100 seeds are drawn without
 replacement, again and again, and the intervals of each draw are held against the truth. With
-`pytest -m long -rP` it prints the tables of docs/statistics.md.
+`pytest -m long -rP` it prints the tables of docs/concepts/statistics.md.
 """
 
 from __future__ import annotations

@@ -176,7 +176,7 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
         and not path.startswith(("tests/", "docs/lessons/"))  # which others make
     }
     pages = [page.read_text("utf-8") for page in (ROOT / "docs").rglob("*.md")]
-    shown = [name for page in pages for name in re.findall(r"\]\(figures/([\w.]+)\)", page)]
+    shown = [name for page in pages for name in re.findall(r"\]\((?:../)?figures/([\w.]+)\)", page)]
     drawn = (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE, *shown)
     figures = {f"docs/figures/{name}" for name in drawn}
     readme = (ROOT / "README.md").read_text("utf-8")

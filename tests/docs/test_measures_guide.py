@@ -1,4 +1,4 @@
-"""The Python of docs/measures.md works, and its tables list every measure and array."""
+"""The Python of docs/how-to/measures.md works, and its tables list every measure and array."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import fields
 
 import pytest
 from command_lines import ROOT
+from guides import blocks
 
 from taichi_ants import Colony, TrainingConfig, measures, worlds
 from taichi_ants.learners.policies import trail_follower
@@ -14,13 +15,13 @@ from taichi_ants.measures.measure import MEASURES
 from taichi_ants.rendering import Snapshot
 from taichi_ants.task import foraging
 
-GUIDE = (ROOT / "docs" / "measures.md").read_text("utf-8")
+GUIDE = (ROOT / "docs/how-to/measures.md").read_text("utf-8")
 
 
 @pytest.mark.slow  # 40 colonies
 def test_the_example_prints_what_the_guide_shows(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    [code] = [part.split("```")[0] for part in GUIDE.split("```python\n")[1:]]
+    [code] = blocks("how-to/measures", "Record measures")
     exec(compile(code, "measures.md", "exec"), {})
     shown = GUIDE.split("The example prints\n\n```\n")[1].split("```")[0]
     assert capsys.readouterr().out == shown

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 
 import pytest
 from command_lines import ROOT
+from guides import blocks
 
 
 @pytest.mark.slow  # colonies that learn, and rules that compile
-@pytest.mark.parametrize("page", ["models", "rules"])
+@pytest.mark.parametrize("page", ["models", "how-to/models"])
 def test_the_examples_of_a_guide_work(page, tmp_path):
-    guide = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
-    parts = [part.split("```")[0] for part in guide.split("```python\n")[1:]]
+    parts = blocks(page) if page == "models" else blocks(page)[:5]
     assert len(parts) > 2
-    script = tmp_path / f"{page}.py"  # rules need a file
+    script = tmp_path / "guide.py"  # rules need a file
     script.write_text("\n\n".join(parts).replace("range(1000, 1100)", "range(1000, 1002)"), "utf-8")
     (tmp_path / "experiments").symlink_to(ROOT / "experiments")
     subprocess.run([sys.executable, str(script)], cwd=tmp_path, check=True, timeout=300)
@@ -24,12 +23,14 @@ def test_the_examples_of_a_guide_work(page, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("page", "word"), [("colony", "Food"), ("colony", "Caste"), ("protocol", "")]
+    ("page", "heading", "word"),
+    [
+        ("concepts/world_and_ants", "", "Food"),
+        ("concepts/world_and_ants", "", "Caste"),
+        ("how-to/measures", "Change a colony during a run", ""),
+    ],
 )
-def test_other_examples_work(page, word):
-    blocks = re.findall(
-        r"```python\n(.*?)```", (ROOT / "docs" / f"{page}.md").read_text(), re.DOTALL
-    )
-    parts = [block for block in blocks if word in block]
+def test_other_examples_work(page, heading, word):
+    parts = [block for block in blocks(page, heading) if word in block]
     assert parts
     exec("\n".join(parts), {})

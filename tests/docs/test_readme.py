@@ -21,7 +21,7 @@ sys.path.remove(str(EXPERIMENTS))
 
 README = (ROOT / "README.md").read_text("utf-8")
 WORDS = " ".join(README.split())
-PAPER = (ROOT / "docs" / "paper.md").read_text("utf-8")
+PAPER = (ROOT / "docs" / "results" / "paper.md").read_text("utf-8")
 
 
 def test_the_ten_lines_print_their_number(capsys):

@@ -1,4 +1,4 @@
-"""The Python of docs/sweeps.md repeats rows of sweeps exactly."""
+"""The Python of docs/how-to/sweeps.md repeats rows of sweeps exactly."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from taichi_ants.studies.study import run
 from taichi_ants.studies.sweep import sweep_of
 from taichi_ants.task import foraging
 
-GUIDE = (ROOT / "docs" / "sweeps.md").read_text("utf-8")
+GUIDE = (ROOT / "docs/how-to/sweeps.md").read_text("utf-8")
 COLONY, RUNS = (part.split("```")[0] for part in GUIDE.split("```python\n")[1:])
 
 
@@ -33,7 +33,7 @@ def of_file(name, seed, **row):
 def test_the_row_of_a_colony_is_the_one_of_the_guide(tmp_path, capsys):
     row = {"task.pheromone.half_life": 20, "task.pheromone.deposit": "add"}
     wanted = row_of(of_file("trails.toml", 3, **row), tmp_path)
-    exec(compile(COLONY, "sweeps.md", "exec"), {})
+    exec(compile(COLONY, "how-to/sweeps.md", "exec"), {})
     assert float(capsys.readouterr().out) == wanted["deliveries"] > 0
 
 
@@ -44,7 +44,7 @@ def test_the_row_of_a_lone_ant_is_the_one_of_the_guide(tmp_path, capsys):
     file["measures"] = ["return_last50", "greedy_return", "greedy_deliveries"]
     wanted = row_of(file, tmp_path)
     found: dict = {}
-    exec(compile(RUNS, "sweeps.md", "exec"), found)
+    exec(compile(RUNS, "how-to/sweeps.md", "exec"), found)
     printed = [float(one) for one in capsys.readouterr().out.split()]
     assert printed == [wanted[name] for name in file["measures"]]
     assert found["trace"].rewards.sum() == found["greedy"].returns.ravel()[0]

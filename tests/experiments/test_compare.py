@@ -50,14 +50,12 @@ SHOWN = [
     for delivery in ("truncates", "terminates")
     for behaviour in ("delivers", "circles_with_food")
 ]
-RENDERS = {f"renders/{name}.gif" for name in SHOWN}
 FILES = {
     *("baselines.csv", "behaviours.csv", "claims.csv", "runs.npz"),
     *("manifest.json", "report.html", "report.txt", "study.json"),
     *("summary.csv", "table2.csv"),
     *(f"policies/{name}.npz" for name in SHOWN),
     *FIGURES,
-    *RENDERS,
 }
 
 
@@ -183,7 +181,6 @@ def test_quick_takes_few_seeds_and_a_folder_of_its_own(tmp_path, compare, monkey
     folder = tmp_path / "results" / "compare-quick"
     assert list((folder / "figures").iterdir())
     assert list((folder / "policies").iterdir())
-    assert not (folder / "renders").exists()
     assert {row["seeds"] for row in read_csv(folder / "summary.csv")} == {"10"}
     assert load("compare").parse_arguments([]).out == Path("results", "compare")
     assert load("compare").parse_arguments(["--quick", "--out", "here"]).out == Path("here")

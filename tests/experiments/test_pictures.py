@@ -236,13 +236,14 @@ def test_mistakes_are_one_sentence(name, arguments, said, tmp_path, capsys) -> N
 def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many_ants(
     lines,
 ) -> None:
-    """docs/paper.md says of it what the picture shows, and how many of 200 ants do so."""
+    """docs/results/paper.md says of it what the picture shows, and how many of 200 ants do so."""
     arguments = gallery.drawing(gallery.GALLERY["learning.gif"])[1]
     _, checkpoints = noted_checkpoints(arguments, paper())
     steps = [len(checkpoint.episode.trace) for checkpoint in checkpoints]
     notes = [checkpoint.note for checkpoint in checkpoints]
     assert len({*zip(steps, notes, strict=True)}) == len(checkpoints)
-    page = " ".join((ROOT / "docs" / "paper.md").read_text(encoding="utf-8").lower().split())
+    page = (ROOT / "docs" / "results" / "paper.md").read_text(encoding="utf-8")
+    page = " ".join(page.lower().split())
     for n, checkpoint in zip(steps[1:], checkpoints[1:], strict=True):
         assert checkpoint.note == "delivered"
         number, _, seeds = checkpoint.among.split()[:3]
@@ -253,7 +254,7 @@ def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many
 
 
 def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why(lines) -> None:
-    """docs/rendering.md says so of this seed."""
+    """docs/how-to/pictures.md says so of this seed."""
     arguments = learning.parse_arguments(["--seed", "7", "--checkpoints", "0", "10", "20"])
     seed, checkpoints = noted_checkpoints(arguments, paper())
     assert seed == 7
@@ -261,7 +262,7 @@ def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why
     assert notes == [("", ""), ("circles with food", ""), ("delivered", "")]
     returns = [int(checkpoint.episode.trace.rewards.sum()) for checkpoint in checkpoints]
     assert returns[1] > returns[2] == 45
-    told = (ROOT / "docs" / "rendering.md").read_text(encoding="utf-8")
+    told = (ROOT / "docs/how-to/pictures.md").read_text(encoding="utf-8")
     assert re.search(rf"returns\s+{returns[1]}\s+after\s+10\s+episodes", told)
     list(learning_frames(checkpoints, (1200, 480)))
     assert f"step 150, return {returns[1]}: circles with food" in lines

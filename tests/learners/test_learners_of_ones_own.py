@@ -294,8 +294,8 @@ def test_learners_that_are_refused_when_they_are_registered(changes, says):
 
 
 def test_the_examples_memory_makes_the_difference(tmp_path):
-    """That of docs/learners.md."""
-    blocks = (ROOT / "docs" / "learners.md").read_text("utf-8").split("```python\n")
+    """That of docs/how-to/models.md."""
+    blocks = (ROOT / "docs/how-to/models.md").read_text("utf-8").split("```python\n")
     (code,) = [block.partition("```")[0] for block in blocks if '"eligible"' in block]
     path = tmp_path / "eligible.py"
     path.write_text(code)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
-
 import pytest
-from command_lines import ROOT
+from guides import blocks
 
 from taichi_ants import TrainingConfig
 from taichi_ants.commands import watch
@@ -42,9 +40,8 @@ def test_the_form_has_every_setting_with_its_bounds():
 
 
 def test_the_python_of_the_guide_works(tmp_path, monkeypatch):
-    text = (ROOT / "docs" / "watching.md").read_text(encoding="utf-8")
     names: dict = {}
     monkeypatch.chdir(tmp_path)
-    exec("\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)), names)
+    exec("\n".join(blocks("how-to/colonies", "Watch ants live")), names)
     assert names["session"].ticks == 2500
     assert (tmp_path / "mine.npz").exists()

@@ -114,7 +114,7 @@ def test_a_wall_across_a_road_of_ants_has_no_hole(what, content):
     colony.tick(200)
     interventions, before = (
         Interventions(colony),
-        {name: colony.arrays[name].copy() for name in colony.columns()},
+        {name: colony.arrays[name].copy() for name in colony._columns()},
     )
     cells = np.sort(before["cell"])[::2]
     interventions.apply(Place(what, cells.tolist()))

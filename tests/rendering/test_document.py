@@ -1,4 +1,4 @@
-"""The examples of `docs/rendering.md` run, each on its own, and write what they say."""
+"""The examples of `docs/how-to/pictures.md` run, each on its own, and write what they say."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "rendering.md"
+DOCUMENT = Path(__file__).parents[2] / "docs/how-to/pictures.md"
 EXAMPLES = re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL)
 WRITTEN = ["learns.html", "crowd.html", "ant.gif", "start.png", "colony.gif"]
 

@@ -279,7 +279,7 @@ def test_rows_of_tables_have_as_many_cells_as_their_heads():
 def test_the_guide_shows_a_part_of_a_real_description():
     path = ROOT / "experiments/sweeps/trails.toml"
     text = of_sweep(plan({"file": path}), files.tomllib.loads(path.read_text()))
-    guide = (ROOT / "docs/archives.md").read_text("utf-8")
+    guide = (ROOT / "docs/how-to/clusters.md").read_text("utf-8")
     shown = guide.split("```markdown\n")[1].split("```")[0]
     assert len(shown) > 500
     assert shown.strip() in text

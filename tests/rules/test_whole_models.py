@@ -161,7 +161,7 @@ def steps_compared(
             twin.begin_episode()
             with timetable:
                 for tick in range(TICKS):
-                    for _ in timetable.pieces(Colony.pieces, 1):
+                    for _ in timetable.pieces(Colony._pieces, 1):
                         pass
                     twin.before_tick()
                     steps += len(plain.ants)

@@ -39,7 +39,7 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     (slots,) = np.nonzero(colony.living[world])
     assert slots.tolist() == sorted(plain.ants)
     theirs = [plain.ants[slot] for slot in slots.tolist()]
-    mine = {name: arrays[name][of_world][slots].tolist() for name in colony.columns()}
+    mine = {name: arrays[name][of_world][slots].tolist() for name in colony._columns()}
     assert grid.cells(colony.cells[world, slots]).tolist() == [list(ant.cell) for ant in theirs]
     for name in ("heading", "carries", "number", "paper_state", "action", "event"):
         assert mine[name] == [getattr(ant, name) for ant in theirs], name

@@ -16,7 +16,7 @@ from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds import World, from_text, load_map, to_text
 from taichi_ants.worlds.text_map import smallest_world
 
-GUIDE = Path(__file__).parents[2] / "docs" / "worlds.md"
+GUIDE = Path(__file__).parents[2] / "docs/how-to/worlds.md"
 
 # A queen and six ants, each on the neighbour at its heading.
 RING = """

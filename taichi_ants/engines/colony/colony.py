@@ -72,9 +72,11 @@ class Colony(TickingColony):
         every: int | None = None,
         protocol: ProtocolEvent | Sequence[ProtocolEvent] = (),
     ) -> ColonyEpisodes:
-        """Return the results of whole episodes with a fixed number of ticks.
+        """Return the results of whole episodes.
 
         Args:
+            episodes: The number of episodes.
+            ticks: The ticks of each episode.
             progress: A function that is called with the share of the work done, 0 to 1.
             worlds: The `world` of `begin_episode` for each episode; None keeps the present worlds.
             measures: Names of registered measures, or `Measure` objects, to read at the end of each
@@ -92,7 +94,7 @@ class Colony(TickingColony):
                 "episodes."
             )
         for place in places if worlds is not None else ():
-            pairs = zip(self.checked_worlds(place), self.seeds, strict=True)
+            pairs = zip(self._checked_worlds(place), self.seeds, strict=True)
             for world, seed in dict.fromkeys(pairs):
                 world.start(seed, self.ants, self.start)  # raises an error if there is no room
         recorder, timetable = SeriesRecorder(measures, every), Timetable(self, protocol, ticks)
@@ -102,7 +104,7 @@ class Colony(TickingColony):
             recorder.begin(episode)
             with timetable:
                 for stop in stops(ticks, recorder.every):
-                    for _ in timetable.pieces(TickingColony.pieces, stop - self.ticks):
+                    for _ in timetable.pieces(TickingColony._pieces, stop - self.ticks):
                         if progress is not None:
                             progress((episode + self.ticks / ticks) / episodes)
                         if not self.running.any():

@@ -151,7 +151,7 @@ class _World:
         self._step_aside(*self._aside(np.array([to])))
         self._fill(np.array([cell]), EMPTY)
         self._fill(np.array([to]), what, number)
-        for feature in self.colony.model.features:
+        for feature in self.colony._model.features:
             for name in feature.filled(self.colony, number) if what == FOOD else ():
                 self.view(name)[to] = self.view(name)[cell]
 
@@ -180,7 +180,7 @@ class _World:
 
     def view(self, name: str) -> np.ndarray:
         """Return a view of the world's part of an array."""
-        return self.colony.part(name, self.w)
+        return self.colony._part(name, self.w)
 
     def _living_slots(self, nest: int | None = None) -> np.ndarray:
         """Return the slots of the living ants, or those of a nest, in the order of numbers."""
@@ -239,18 +239,18 @@ class _World:
         if what == QUEEN:
             self.queen_cells[number] = cells[0]
             world = World(grid.ranges, grid.cells(cells[0]).tolist())
-            for name, make in arrays_of(colony.model.senses).items():
+            for name, make in arrays_of(colony._model.senses).items():
                 self.view(name).reshape(colony.n_nests, -1)[number] = make(world, 0)
-        for feature in colony.model.features:
+        for feature in colony._model.features:
             for name, value in feature.filled(colony, number).items() if what == FOOD else ():
                 self.view(name)[cells] = value
-        if colony.model.food_changes:
+        if colony._model.food_changes:
             room = colony.n_food_sources
             sources = [food_sources.of_world(arrays, w, room) for w in range(len(colony.worlds))]
             now = food_sources.changed(sources[self.w], cells, what, number, grid.offsets)
             sources[self.w] = now
             if now.shape[1] > room:
-                colony.read_start(now.shape[1])
+                colony._read_start(now.shape[1])
             arrays |= food_sources.arrays(
                 sources, arrays["worlds"], colony.n_food_sources, grid.size
             )
@@ -289,7 +289,7 @@ class _World:
 
     def _lay(self, cells: np.ndarray, level: int, number: int) -> None:
         """Set the levels of a pheromone in cells; 0 is the trail."""
-        stored, clock = self.colony.stored_pheromone(self.w, number)
+        stored, clock = self.colony._stored_pheromone(self.w, number)
         stored[cells] = level + clock if level else 0
 
     def _add(self, cells: np.ndarray, nests: np.ndarray) -> Change:
@@ -317,9 +317,9 @@ class _World:
             "stage": Stage.NEWBORN,
             "streams": stream_state(colony.seeds[self.w], STREAM_BORN, born),
         }
-        for feature in colony.model.features:
+        for feature in colony._model.features:
             newborn |= feature.newborn(colony, self.w, nests, self.all.stream(self.w).bits)
-        for name in colony.columns():
+        for name in colony._columns():
             self.view(name)[slots] = newborn[name] if name in newborn else COLUMNS[name].start
         ground[cells] = OBSTACLE | (ANT_STANDS - nests) << 4
         rows[WorldRow.NEXT_NUMBER] += n
@@ -333,7 +333,7 @@ class _World:
         self.view("first_streams")[numbers[first]] = self.view("streams")[slots[first]]
         self.view("ground")[self.view("cell")[slots]] = EMPTY
         self.view("stage")[slots] = Stage.VACANT
-        colony.close_gaps()
+        colony._close_gaps()
         self._count_ants()
 
     def _count_ants(self) -> None:
@@ -405,21 +405,21 @@ class Interventions:
                 if isinstance(change, language.SetEpsilon):
                     colony.epsilon = change.value
                 else:
-                    colony.set_learning_rate(change.value)
+                    colony._set_learning_rate(change.value)
             case _:
                 self._change(change)
 
     def _change(self, change: Intervention) -> None:
         """Make a change in all worlds, after its checks in all; then their ants observe again."""
         colony, worlds = self.colony, list(self.worlds)
-        colony.check_begun()
+        colony._check_begun()
         changes: list[Change] = [getattr(_World(self, w), change.path)(change) for w in worlds]
         for in_world in changes:
             next(in_world)
         colony.ready[worlds] = False  # also after Ctrl-C before the end
         for in_world in changes:
             next(in_world, None)
-        colony.observe(worlds)
+        colony._observe(worlds)
         colony.ready[worlds] = True
         if self.lasting and isinstance(change, language.SetAnts):
             self.changed |= change.number != self.ants
@@ -429,14 +429,14 @@ class Interventions:
         """Set a task that differs only in settings that kernels read as numbers."""
         colony = self.colony
         before = {
-            (w, number): colony.stored_pheromone(w, number)
+            (w, number): colony._stored_pheromone(w, number)
             for w in range(len(colony.worlds))
             for number, pheromone in enumerate(colony.pheromones)
             if not pheromone.dense
         }
-        colony.set_task(task)
+        colony._set_task(task)
         for which, (stored, clock) in before.items():
-            _, now = colony.stored_pheromone(*which)
+            _, now = colony._stored_pheromone(*which)
             stored[:] = np.where(stored > clock, stored - clock + now, 0)
 
     def state(self) -> str:
@@ -450,7 +450,7 @@ class Interventions:
             colony.ants,
         ]
         rest += [self.ants, streams, colony.task.as_dict(), colony.training.as_dict()]
-        maps = arrays_of(colony.model.senses)
+        maps = arrays_of(colony._model.senses)
         arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", *maps)}
         arrays |= {f"start {w}": start for w, start in enumerate(self.starts)}
         digest = hashlib.sha256(files.to_json(rest).encode())

@@ -17,30 +17,31 @@ from taichi_ants.task.model import Model
 
 # Small values that each tick uses take one byte, which is a quarter of the memory traffic.
 _CORE = (
-    Array("cell", ANT, "i4", "cells"),
-    # Ticks since the pick-up of its food, or, if a field needs it, without food.
-    Array("carried", ANT, "i4", "carried"),
-    # The number of its last ant; -1 in a slot that was never used in this episode.
-    Array("number", ANT, "i4", "numbers", start=-1),
+    Array("cell", ANT, "i4", "cells", doc="Flat index of the cell"),
+    Array("carried", ANT, "i4", "carried",
+          doc="Ticks since the pick-up of the food or, if a field needs it, without food"),
+    Array("number", ANT, "i4", "numbers", start=-1,
+          doc="Number of the last ant in the slot; -1 in a slot not used in this episode"),
     # The cell to enter or to take food from, else its own; later its previous cell.
     Array("want", ANT, "i4"),
-    # The state index, unless it is the paper's state.
-    Array("state", ANT, "i4", "states", "i4", instead="paper_state"),
+    Array("state", ANT, "i4", "states", "i4", instead="paper_state",
+          doc="State index before the next action"),
     # The reward of the last action, if rewards are by your own rule.
     Array("reward", ANT, "i4"),
-    Array("heading", ANT, "i1", "headings"),
-    Array("carries", ANT, "i1", "carrying", "bool"),
-    Array("stage", ANT, "i1", "stages"),  # a `Stage`
-    Array("paper_state", ANT, "i1", "paper_states"),  # which decides about actions and rewards
-    Array("event", ANT, "i1", "events"),  # the result of the last action, an `Event`
-    # The last action, -1 before the first one; or the next one, if actions are given.
-    Array("action", ANT, "i1", "actions", start=-1),
-    # The last action as executed, if actions slip; else it is `action`.
-    Array("executed", ANT, "i1", "executed", "i1", start=-1, instead="action"),
-    # The next action if it is drawn already, else -1.
-    Array("next_action", ANT, "i1", "next_actions", start=-1),
-    Array("nest", ANT, "i1", "nests", "i4"),
-)
+    Array("heading", ANT, "i1", "headings", doc="Heading, 0 to 5"),
+    Array("carries", ANT, "i1", "carrying", "bool", doc="Whether the ant carries food"),
+    Array("stage", ANT, "i1", "_stages"),  # a `Stage`
+    Array("paper_state", ANT, "i1", "paper_states",
+          doc="State index in the paper's view, which decides about actions and rewards"),
+    Array("event", ANT, "i1", "events", doc="Result of the last action, an `Event`"),
+    Array("action", ANT, "i1", "actions", start=-1,
+          doc="Last action, -1 before the first; the next one if actions are given"),
+    Array("executed", ANT, "i1", "executed", "i1", start=-1, instead="action",
+          doc="Last action as executed, which differs from the chosen one if it slipped"),
+    Array("next_action", ANT, "i1", "next_actions", start=-1,
+          doc="Next action if it is drawn already, else -1"),
+    Array("nest", ANT, "i1", "nests", "i4", doc="Number of the nest"),
+)  # fmt: skip
 # The arrays with an entry for each slot by name; of features, too.
 COLUMNS = {array.name: array for array in (*_CORE, *(array for _, array in arrays(ANT)))}
 

@@ -1,7 +1,7 @@
 """Sort the ants of each world by cell: a stable radix sort by two digits, which threads share.
 
-It gives the same order as `ColonyState.sort_ants`. Columns move through `spare`, as many at once as
-fit into its 64 bits.
+It gives the same order as `ColonyState._sort_ants`. Columns move through `spare`, as many at once
+as fit into its 64 bits.
 """
 
 from collections.abc import Callable, Iterator

@@ -96,7 +96,12 @@ def _view_of(array: Array) -> property:
         entries = entries.reshape(shape)
         return entries.astype(array.shown_as) if array.shown_as else entries
 
-    return property(read)
+    kind = np.dtype(array.shown_as or array.dtype)
+    places = {ANT: "capacity", NEST: "nests", CELL: "grid.size"}.get(array.per, array.per)
+    about = array.doc or array.words.capitalize()
+    return property(
+        read, doc=f"{about}: {kind} (W, {places}){'' if array.shown_as else ', a view'}."
+    )
 
 
 class ColonyState:
@@ -117,17 +122,10 @@ class ColonyState:
         ready: bool (W,), whether an episode has begun, and each change of it was completed.
         delivered: int64 (W,), food items delivered in previous episodes.
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
-        running: bool (W,), whether the episode of each world is still running.
-        episode_ticks: int32 (W,), ticks since the episode of each world began; a view.
-        deliveries: int32 (W,), deliveries of the present episode; a view.
-        living: bool (W, capacity), whether an ant lives in each slot.
-        queen_cells: int32 (W, nests), flat indices of the cells of queens; a view.
 
-    Arrays by slot have views (W, capacity) by the names in `layout.COLUMNS`: `numbers`, `cells`,
-    `headings`, `paper_states`, `actions`, `events` and `next_actions`, which are writable, and
-    copies such as `states`, `executed`, `carrying` and `nests`. They hold what belongs to the last
-    ant in the slot. `streams` has the states of random streams, uint64. The arrays of features have
-    views (W, capacity) or (W, nests), too, which are 0 in colonies without the feature.
+    Properties show the arrays in `layout.COLUMNS`, as writable views or as copies; those (W,
+    capacity) hold what belongs to the last ant in the slot. Arrays of features are 0 in colonies
+    without the feature.
     """
 
     if TYPE_CHECKING:  # the views of arrays, see below
@@ -164,14 +162,14 @@ class ColonyState:
         running = runtime.start(threads, arch)
         self.schedule = schedule_of(schedule, len(self.seeds), self.capacity, running.arch)
         self.n_nests = 0
-        worlds = self.checked_worlds(world)
+        worlds = self._checked_worlds(world)
         self.n_nests, shape = worlds[0].n_nests, () if table is None else table.shape
         # A table (W, n, ...) is by nest if n is the number of several nests, see `owners`.
         by_slot = len(shape) == 4 and (self.n_nests == 1 or shape[1] != self.n_nests)
         by_slot = by_slot and not self.learns and not any(f.tables_by for f in used_by(task))
         self.one_a_slot = by_slot or sharing == "independent"
         self.pheromones = task.pheromones_while(self.learns)
-        self.memory, model = Memory(), self.model
+        self.memory, model = Memory(), self._model
         if model.learner is not None and (self.one_a_slot or model.plans_together):
             self.memory = model.learner.memory_for(self.training, task.n_states)
         # The states of all tables that ants of a world share, and the most chunks of a world.
@@ -182,7 +180,7 @@ class ColonyState:
             sizes = len(self.seeds), self.capacity, self._shared_rows * ROW, places
             self.chunks = most_chunks(*sizes)
         self.arrays = _no_arrays(self.schedule)
-        self.lay_out(worlds)
+        self._lay_out(worlds)
         self.arrays |= (lasting := self._lasting(table))
         self.stored = (*self._changing, *lasting)
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
@@ -190,7 +188,7 @@ class ColonyState:
         self.delivered = np.zeros(len(self.seeds), np.int64)
 
     @cached_property
-    def model(self) -> Model:
+    def _model(self) -> Model:
         """The properties of the colony for which kernels are compiled."""
         learner = learners.get(self.training.learner) if self.learns else None
         own_tables, is_given = self.one_a_slot, self.is_given_actions
@@ -212,18 +210,33 @@ class ColonyState:
     def ticks(self, ticks: int) -> None:
         self.arrays["orders"][Order.PASSED] = ticks
 
-    running = property(lambda colony: colony.arrays["worlds"][WorldRow.RUNNING] == 1)
-    episode_ticks = property(lambda colony: colony.arrays["worlds"][WorldRow.TICKS])
-    deliveries = property(lambda colony: colony.arrays["worlds"][WorldRow.DELIVERIES])
-    living = property(lambda colony: colony.stages == Stage.LIVING)
-    queen_cells = property(lambda colony: colony.of_nests(NestRow.QUEEN_CELL))
-    streams = _view_of(Array("streams", ANT, "u8"))
+    running = property(
+        lambda colony: colony.arrays["worlds"][WorldRow.RUNNING] == 1,
+        doc="Whether the episode of each world is still running: bool (W,).",
+    )
+    episode_ticks = property(
+        lambda colony: colony.arrays["worlds"][WorldRow.TICKS],
+        doc="Ticks since the episode of each world began: int32 (W,), a view.",
+    )
+    deliveries = property(
+        lambda colony: colony.arrays["worlds"][WorldRow.DELIVERIES],
+        doc="Deliveries of the present episode: int32 (W,), a view.",
+    )
+    living = property(
+        lambda colony: colony._stages == Stage.LIVING,
+        doc="Whether an ant lives in each slot: bool (W, capacity).",
+    )
+    queen_cells = property(
+        lambda colony: colony._of_nests(NestRow.QUEEN_CELL),
+        doc="Flat indices of the cells of queens: int32 (W, nests), a view.",
+    )
+    streams = _view_of(Array("streams", ANT, "u8", doc="State of the random stream"))
 
-    def part(self, name: str, world: int) -> np.ndarray:
+    def _part(self, name: str, world: int) -> np.ndarray:
         """Return a view of a world's part of an array that has only parts of worlds."""
         return self.arrays[name].reshape(len(self.seeds), -1)[world]
 
-    def of_nests(self, row: int) -> np.ndarray:
+    def _of_nests(self, row: int) -> np.ndarray:
         """Return a view (W, nests) of a row of the numbers of nests."""
         return self.arrays["nests"][row].reshape(len(self.seeds), -1)
 
@@ -258,17 +271,17 @@ class ColonyState:
     @property
     def _groups(self) -> dict[str, int]:
         """The numbers of nests, and of groups in a nest, whose ants share a table."""
-        by = (feature.tables_by for feature in self.model.features if feature.tables_by)
+        by = (feature.tables_by for feature in self._model.features if feature.tables_by)
         return {NEST: self.n_nests, **{per: self.sizes[per] for per in by}}
 
     @property
-    def owners(self) -> int:
+    def _owners(self) -> int:
         """The number of tables in each world: one for each slot, or for each nest and caste."""
         return math.prod(self._axes.values())
 
     @property
     def tables_of_ants(self) -> np.ndarray:
-        """The table of `owners` by which the last ant in each slot acts, int32 (W, capacity)."""
+        """The number of the table by which the last ant in each slot acts, int32 (W, capacity)."""
         if self.one_a_slot:
             return np.tile(np.arange(self.capacity, dtype=np.int32), (len(self.seeds), 1))
         tables = np.zeros_like(self.nests)
@@ -282,20 +295,20 @@ class ColonyState:
         if "reward" in self.arrays:
             return self.arrays["reward"].reshape(self.events.shape).copy()
         rewards = self.task.rewards.by_event()[self.events]
-        for feature in self.model.features:
+        for feature in self._model.features:
             rewards = feature.paid(self, rewards)
         return rewards
 
     def outcome(self) -> ColonyEpisodes:
-        """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
-        self.check_finite()
+        """Return the results of the episode so far, arrays (1, W); AntsError if a value is NaN."""
+        self._check_finite()
         return self._results()
 
     def _results(self) -> ColonyEpisodes:
         rows, totals = self.arrays["worlds"], self.arrays["totals"]
         counts: Arrays = {
             **{row.name.lower(): totals[row] for row in TOTALS},
-            "waiting_births": self.of_nests(NestRow.STORE).sum(axis=1, dtype=np.int32),
+            "waiting_births": self._of_nests(NestRow.STORE).sum(axis=1, dtype=np.int32),
             **{row.name.lower(): rows[row] for row in WorldRow if row >= WorldRow.TICKS},
         }
         for feature in FEATURES:
@@ -305,19 +318,19 @@ class ColonyState:
 
     def snapshot(self, world: int = 0) -> Snapshot:
         """Return the present state of world number `world`; arrays are copies."""
-        self.check_begun()
+        self._check_begun()
         w = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
         slots, levels = self.living[w], {}
         further: dict[str, Any] = {}
         shown = {name: getattr(self, name)[w, slots] for name in (*_IN_SNAPSHOTS, *OF_ANTS)}
         ants = {f"ant_{name}": shown[name].astype(np.int32) for name in _IN_SNAPSHOTS}
         carries = self.carrying[w, slots]
-        ground = self.part("ground", w).copy()
+        ground = self._part("ground", w).copy()
         ground[ants["ant_cells"]] = EMPTY
         for number, name in enumerate(self.task.pheromones):
-            stored, clock = self.stored_pheromone(w, number)
+            stored, clock = self._stored_pheromone(w, number)
             levels[name] = np.maximum(stored - stored.dtype.type(clock), 0)
-        for feature in self.model.features:
+        for feature in self._model.features:
             further |= feature.shown(self, w, slots, ground == FOOD)
         return Snapshot(
             self.grid,
@@ -334,7 +347,7 @@ class ColonyState:
             **further,
         )
 
-    def stored_pheromone(self, world: int, number: int) -> tuple[np.ndarray, int]:
+    def _stored_pheromone(self, world: int, number: int) -> tuple[np.ndarray, int]:
         """Return a view of a pheromone as kernels store it, and its clock; 0 is the trail.
 
         A pheromone in whole numbers has expiry clocks, int32 (grid.size,). A dense one has levels,
@@ -342,10 +355,10 @@ class ColonyState:
         """
         pheromone = self.pheromones[number]
         falls = pheromone.evaporation == "linear" and not pheromone.dense
-        stored = self.part(array_of(number, pheromone.dense), world)
+        stored = self._part(array_of(number, pheromone.dense), world)
         return stored, int(self.episode_ticks[world]) * falls
 
-    def check_begun(self) -> None:
+    def _check_begun(self) -> None:
         """Raise an AntsError unless all worlds are in an episode, whose changes are complete."""
         if not self.ready.all():
             why = "no episode has begun"
@@ -353,126 +366,126 @@ class ColonyState:
                 why = "not all worlds have begun an episode, or an intervention was interrupted"
             raise AntsError(f"{why}; call begin_episode first.")
 
-    def check_finite(self) -> None:
+    def _check_finite(self) -> None:
         """Raise an AntsError if an action value is not finite."""
         tables = self.arrays["q"].reshape(len(self.seeds), -1)
         check_finite(tables, [self.training], self.seeds)
 
     # Changes
 
-    def checked_worlds(self, world: World | Sequence[World]) -> tuple[World, ...]:
+    def _checked_worlds(self, world: World | Sequence[World]) -> tuple[World, ...]:
         """Return one world per seed; AntsError if their number is wrong or one does not fit."""
         return arguments.checked_worlds(world, len(self.seeds), self.learns, self.n_nests)
 
-    def lay_out(self, worlds: tuple[World, ...]) -> None:
+    def _lay_out(self, worlds: tuple[World, ...]) -> None:
         """Make the arrays that depend on the worlds; AntsError if they have too few free cells."""
         self.worlds, self.grid = worlds, worlds[0].grid
         self.sizes = {ANT: self.capacity, NEST: self.n_nests, CELL: self.grid.size}
         for feature in FEATURES:
             self.sizes |= {per: of(self) for per, of in feature.spaces.items()}
-        for feature in self.model.features:
+        for feature in self._model.features:
             for refusal in feature.refusals(self):
                 raise AntsError(refusal)
         self.changed = np.zeros(len(worlds), bool)
         most = max(len(world.foods) for world in worlds)
-        self.make_room_for_food(most if self.model.food_changes else 0)
+        self._make_room_for_food(most if self._model.food_changes else 0)
         self.arrays |= self._constants()
 
-    def make_room_for_food(self, n: int) -> None:
+    def _make_room_for_food(self, n: int) -> None:
         """Reset all arrays of episodes, with room for n food sources in each world."""
-        self.read_start(n)
+        self._read_start(n)
         made = {name: array.copy() for name, array in self.at_start.items()}
         made |= self._pheromone_arrays(len(self.worlds) * self.grid.size)
-        dense = self.model.dense_by_number[0]  # of the trail; the other array is not in use
+        dense = self._model.dense_by_number[0]  # of the trail; the other array is not in use
         made[array_of(0, not dense)] = np.zeros(1, np.int32 if dense else np.float32)
         for dtype in ("i4", "i1", "f4"):
-            used = [array.name for array in columns_of(self.model) if array.dtype == dtype]
+            used = [array.name for array in columns_of(self._model) if array.dtype == dtype]
             # One allocation, because columns at equal offsets in pages slow each other down.
             columns = np.zeros((len(used), len(self.worlds) * self.capacity), dtype)
             made |= zip(used, columns, strict=True)
         self._changing = tuple(made)
         self.arrays |= made
-        self.set_to_start()
+        self._set_to_start()
 
-    def count_deliveries(self, which: Which = ALL) -> None:
+    def _count_deliveries(self, which: Which = ALL) -> None:
         """Add the deliveries of the episode to those of the previous ones."""
         deliveries = self.deliveries
         # No call is between the two statements, so Ctrl-C does not separate them.
         self.delivered[which] += deliveries[which]
         deliveries[which] = 0
 
-    def set_task(self, task: Task) -> None:
+    def _set_task(self, task: Task) -> None:
         """Set a task for which the colony has the right arrays and kernels."""
         self.task, self.pheromones = task, task.pheromones_while(self.learns)
         self.arrays |= self._settings()
 
-    def stop(self, which: np.ndarray) -> None:
+    def _stop(self, which: np.ndarray) -> None:
         """End the episode of some worlds, bool (W,), which then wait for their next episode."""
         self.arrays["worlds"][WorldRow.RUNNING, which] = 0
 
-    def keep_streams(self, which: Which = ALL) -> None:
+    def _keep_streams(self, which: Which = ALL) -> None:
         """Save the random streams of the ants that started the episode of these worlds."""
         ours = np.zeros((len(self.seeds), 1), bool)
         ours[which] = True
-        there = (self.stages != Stage.VACANT) & ours
+        there = (self._stages != Stage.VACANT) & ours
         worlds, slots = np.nonzero(there & (self.numbers >= 0) & (self.numbers < self.ants))
         first_streams = self.arrays["first_streams"].reshape(self.numbers.shape)
         first_streams[worlds, self.numbers[worlds, slots]] = self.streams[worlds, slots]
 
-    def set_learning_rate(self, learning_rate: float) -> None:
+    def _set_learning_rate(self, learning_rate: float) -> None:
         """Set the learning rate and the update weights."""
         self.learning_rate = learning_rate
-        weights, kept = self.update_weights(learning_rate), self.arrays["weights"]
+        weights, kept = self._update_weights(learning_rate), self.arrays["weights"]
         if len(weights) > len(kept):  # rare, because Taichi leaks some bytes for each new array
             room = min(2 * len(weights), self.capacity + 1)
             kept = self.arrays["weights"] = np.empty(room, np.float32)
         kept[: len(weights)], kept[len(weights) :] = weights, weights[-1]
 
-    def update_weights(self, learning_rate: float) -> np.ndarray:
+    def _update_weights(self, learning_rate: float) -> np.ndarray:
         """Return the weight of the mean of n TD errors in an update, by n."""
         return update_weights(learning_rate, self.capacity if self.sharing == "shared" else 1)
 
     @property
-    def can_sort(self) -> bool:
+    def _can_sort(self) -> bool:
         """Whether ants may change slots: not if slots matter, or some are vacant.
 
         Ants have numbers, so their order does not change results. Vacant slots are the last ones.
         """
         living = self.arrays["worlds"][WorldRow.LIVING]
-        return not self.model.slots_matter and int(living.min()) == self.capacity
+        return not self._model.slots_matter and int(living.min()) == self.capacity
 
     @property
-    def near_bits(self) -> int:
+    def _near_bits(self) -> int:
         """The number of the lowest bits of a cell's number that do not matter to the order."""
         return max(0, self.grid.size.bit_length() - SORTED_BITS)
 
-    def sort_ants(self) -> None:
+    def _sort_ants(self) -> None:
         """Sort the ants of a world roughly by cell, so that neighbours share caches."""
         # NumPy sorts keys of 16 bits in a tenth of the time.
-        self._sort_slots((self.cells >> self.near_bits).astype(np.uint16))
+        self._sort_slots((self.cells >> self._near_bits).astype(np.uint16))
 
-    def close_gaps(self) -> None:
+    def _close_gaps(self) -> None:
         """Move vacant slots behind those with ants, unless slots matter."""
-        if not self.model.slots_matter:
-            self._sort_slots(self.stages == Stage.VACANT)
+        if not self._model.slots_matter:
+            self._sort_slots(self._stages == Stage.VACANT)
 
     def _sort_slots(self, keys: np.ndarray) -> None:
         """Sort the slots of each world by keys (W, capacity), equal ones in their present order."""
         first = np.arange(len(self.seeds))[:, None] * self.capacity
         order = (np.argsort(keys, axis=1, kind="stable") + first).ravel()
-        for name in self.columns():
+        for name in self._columns():
             self.arrays[name][:] = self.arrays[name][order]
 
-    def columns(self) -> tuple[str, ...]:
+    def _columns(self) -> tuple[str, ...]:
         """Return the names of the arrays with one entry for each slot."""
         return (*(name for name in COLUMNS if name in self.arrays), "streams")
 
     # Arrays
 
-    def read_start(self, n_food_sources: int) -> None:
+    def _read_start(self, n_food_sources: int) -> None:
         """Set the arrays with which worlds and ants begin each episode, see `set_to_start`."""
         self.n_food_sources = n_food_sources
-        worlds, n, model = self.worlds, self.ants, self.model
+        worlds, n, model = self.worlds, self.ants, self._model
         starts = [w.start(seed, n, self.start) for w, seed in zip(worlds, self.seeds, strict=True)]
         cells = np.stack([cells for cells, _ in starts])
         self.nests_at_start = nests = self._of_each(lambda world: world.nests_of(n))
@@ -525,12 +538,12 @@ class ColonyState:
         """Return empty arrays (n,) of all pheromones."""
         return {
             array_of(number, dense): np.zeros(n, np.float32 if dense else np.int32)
-            for number, dense in enumerate(self.model.dense_by_number)
+            for number, dense in enumerate(self._model.dense_by_number)
         }
 
-    def set_to_start(self, which: Which = ALL) -> None:
+    def _set_to_start(self, which: Which = ALL) -> None:
         """Reset the arrays that change in an episode, for these worlds."""
-        self.copy_worlds(self.at_start, which)
+        self._copy_worlds(self.at_start, which)
         shape, n = (len(self.worlds), self.capacity), self.first["cell"].shape[1]
         starts: Arrays = {**self.first, "number": np.arange(n), "stage": np.array(Stage.LIVING)}
         for name in COLUMNS.keys() & self.arrays.keys():
@@ -542,7 +555,7 @@ class ColonyState:
     def _lasting(self, q_values: np.ndarray | None) -> Arrays:
         """Return the arrays that last through all episodes."""
         slots, memory, n_worlds = self.capacity, self.memory, len(self.seeds)
-        owners = n_worlds * self.owners
+        owners = n_worlds * self._owners
         sizes = ((1 + memory.tables) * self.task.n_states * ROW, memory.floats, memory.integers)
         if owners * max(sizes) > _MOST_NUMBERS:
             raise AntsError(
@@ -552,14 +565,14 @@ class ColonyState:
             )
         return {
             "streams": np.zeros(n_worlds * slots, np.uint64),
-            **self.seeded(),
+            **self._seeded(),
             # By world or slot: the table, then further tables of the learner; its memory.
             "q": self._tables(q_values),
             "floats": np.zeros(max(1, owners * memory.floats), np.float32),
             "integers": np.zeros(max(1, owners * memory.integers), np.int32),
         }
 
-    def seeded(self) -> Arrays:
+    def _seeded(self) -> Arrays:
         """Return the arrays that depend on seeds and last through all episodes."""
         seeds = words_of(self.seeds)
         ants = np.arange(self.capacity, dtype=np.uint64)  # more ants may start later episodes
@@ -573,13 +586,13 @@ class ColonyState:
 
     def _tables(self, q_values: np.ndarray | None) -> np.ndarray:
         """Return the tables of all worlds or slots, with `q_values` or the initial value."""
-        n_worlds, slots, n_states = len(self.seeds), self.owners, self.task.n_states
+        n_worlds, slots, n_states = len(self.seeds), self._owners, self.task.n_states
         q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
         q[..., :N_ACTIONS] = self.training.initial_q
         if q_values is not None:
             tables = arguments.checked_tables(q_values, n_worlds, self._axes)
             q[..., :N_ACTIONS] = tables[..., None, :, :]
-        for feature in self.model.features:
+        for feature in self._model.features:
             for number, (policy, name) in feature.policies(self.task).items():
                 table = frozen_policy(policy, self.task.observation, name)
                 of_groups = q.reshape(n_worlds, self.n_nests, -1, *q.shape[2:])
@@ -594,9 +607,9 @@ class ColonyState:
         if self.schedule != "by_world":
             sums, touched = n_worlds + chunks, TOUCHED_LINE * -(-rows // TOUCHED_LINE)
         pairs, cells = max(1, sums * rows * ROW), n_worlds * self.grid.size
-        by_ant, plans = self.schedule == BY_ANT, self.model.plans_together
+        by_ant, plans = self.schedule == BY_ANT, self._model.plans_together
         return {
-            **self.ground_constants(),
+            **self._ground_constants(),
             "compass": compass_of(self.grid),  # see `rules.actions`
             "seeds": words_of(self.seeds),
             **self._settings(),
@@ -608,7 +621,7 @@ class ColonyState:
             "spare": np.zeros_like(self.arrays["level"]),  # the next levels, with diffusion
             **{
                 f"spare_{number}": np.zeros(cells, np.float32)
-                for number, dense in enumerate(self.model.dense_by_number)
+                for number, dense in enumerate(self._model.dense_by_number)
                 if number and dense
             },
             "orders": np.array([self.chunks * (one == Order.CHUNKS) for one in Order], np.int32),
@@ -628,19 +641,19 @@ class ColonyState:
         """Return the settings of the task as kernels read them."""
         task = self.task
         settings = {"rewards": task.rewards.by_event(), **numbers(task)}
-        for feature in self.model.features:
+        for feature in self._model.features:
             settings |= feature.constants(self)
         if task.rules:  # the parameters of your own rules
             rules = [value for rule in task.rules.values() for value in vars(rule).values()]
             settings["rule_numbers"] = np.array([*rules, 0.0], np.float64)
         return settings
 
-    def ground_constants(self) -> Arrays:
+    def _ground_constants(self) -> Arrays:
         """Return the constants that depend on the world."""
         return {
             # 1 for rocks and outside.
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
-            **{name: self._maps(make) for name, make in arrays_of(self.model.senses).items()},
+            **{name: self._maps(make) for name, make in arrays_of(self._model.senses).items()},
         }
 
     def _maps(self, make: Callable[[World, int], Any]) -> np.ndarray:
@@ -653,7 +666,7 @@ class ColonyState:
         made = {world: make(world) for world in dict.fromkeys(self.worlds)}
         return np.stack([made[world] for world in self.worlds])
 
-    def copy_worlds(self, source: Arrays, which: Which) -> None:
+    def _copy_worlds(self, source: Arrays, which: Which) -> None:
         """Copy some worlds from other arrays; worlds are consecutive in the last axis."""
         n_worlds = len(self.seeds)
         for name, array in source.items():
@@ -664,7 +677,7 @@ class ColonyState:
 
     # Files
 
-    def contents(self) -> tuple[dict[str, Any], Arrays]:
+    def _contents(self) -> tuple[dict[str, Any], Arrays]:
         """Return the contents of a file: facts and arrays."""
         arrays = {f"array_{name}": self.arrays[name] for name in self.stored}
         places = {world: place for place, world in enumerate(dict.fromkeys(self.worlds))}
@@ -685,11 +698,11 @@ class ColonyState:
 
         AntsError if an action value is not finite, seeds repeat, or the file cannot be written.
         """
-        self.check_finite()
+        self._check_finite()
         arguments.checked_seeds(self.seeds)
         if self.episode >= 0:
-            self.check_begun()
-        facts, arrays = self.contents()
+            self._check_begun()
+        facts, arrays = self._contents()
         _KIND.write(path, facts, arrays, compress=False)
 
     @classmethod
@@ -719,9 +732,9 @@ class ColonyState:
             colony = cls([worlds[w] for w in facts["world_of"]], known, training, **options)
             colony.task, colony.length, colony.ticks = task, facts["length"], facts["ticks"]
             colony.epsilon = arguments.checked_share("epsilon", facts["epsilon"])
-            colony.set_learning_rate(facts["learning_rate"])
+            colony._set_learning_rate(facts["learning_rate"])
             if facts["food_sources"] != colony.n_food_sources:
-                colony.make_room_for_food(facts["food_sources"])
+                colony._make_room_for_food(facts["food_sources"])
             for name in colony.stored:
                 array = colony.arrays[name]
                 array[:] = as_array(name, arrays[f"array_{name}"], array.dtype, array.shape)
@@ -732,7 +745,7 @@ class ColonyState:
         """Return whether both would be saved as equal files, and so behave identically."""
         if not isinstance(other, ColonyState):
             return NotImplemented
-        (facts, arrays), (other_facts, other_arrays) = self.contents(), other.contents()
+        (facts, arrays), (other_facts, other_arrays) = self._contents(), other._contents()
         return facts == other_facts and same(arrays, other_arrays)
 
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick

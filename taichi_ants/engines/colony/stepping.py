@@ -104,9 +104,9 @@ class TickingColony(ColonyState):
         fresh.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
         if world is not None:  # which may have too little room
             fresh.arrays = copy.copy(self.arrays)
-            fresh.lay_out(self.checked_worlds(world))
+            fresh._lay_out(self._checked_worlds(world))
         self.ready[:] = False  # also after Ctrl-C before the end
-        self.count_deliveries()
+        self._count_deliveries()
         vars(self).update(vars(fresh))
         self.ticks = 0
         self._start()
@@ -117,15 +117,15 @@ class TickingColony(ColonyState):
         Tables, memories and random streams stay.
         """
         self.ready[which] = False
-        self.count_deliveries(which)
-        self.set_learning_rate(self.learning_rate)
-        self.set_to_start(which)
+        self._count_deliveries(which)
+        self._set_learning_rate(self.learning_rate)
+        self._set_to_start(which)
         stale = np.zeros_like(self.changed)
         stale[which] = self.changed[which]
         if stale.any():
-            self.copy_worlds(self.ground_constants(), stale)
+            self._copy_worlds(self._ground_constants(), stale)
             self.changed[stale] = False
-        self.copy_worlds({"streams": self.arrays["first_streams"]}, which)
+        self._copy_worlds({"streams": self.arrays["first_streams"]}, which)
         self.arrays["episodes"][which] += 1
         self._launch("begin")
         self.ready[which] = True
@@ -143,7 +143,7 @@ class TickingColony(ColonyState):
         """
         which = as_array("which", which, "b", (len(self.seeds),))
         if seeds is None:
-            self.keep_streams(which)
+            self._keep_streams(which)
         else:
             listed, (places,) = entries_of(seeds) or [], np.nonzero(which)
             checked = [seed for one in listed for seed in arguments.checked_seeds(one)]
@@ -154,11 +154,11 @@ class TickingColony(ColonyState):
             changed = dict(zip(places.tolist(), checked, strict=True))
             self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
             self.arrays["seeds"][:] = words_of(self.seeds)
-            self.read_start(self.n_food_sources)
-            self.copy_worlds(self.seeded(), which)
+            self._read_start(self.n_food_sources)
+            self._copy_worlds(self._seeded(), which)
         self._start(which)
 
-    def observe(self, worlds: Sequence[int]) -> None:
+    def _observe(self, worlds: Sequence[int]) -> None:
         """Let the ants of some worlds observe again, after interventions in these worlds."""
         running = self.arrays["worlds"][WorldRow.RUNNING].copy()
         others = np.setdiff1d(np.arange(len(running)), worlds)
@@ -170,13 +170,13 @@ class TickingColony(ColonyState):
 
     def tick(self, n: int = 1) -> None:
         """Advance by n ticks, except worlds whose episode has ended."""
-        self.check_begun()
+        self._check_begun()
         if self.is_given_actions:
             raise AntsError(
                 "training is None, so ants do not choose actions; call act with the actions of "
                 "each tick instead."
             )
-        for _ in self.pieces(checked_whole("n", n)):
+        for _ in self._pieces(checked_whole("n", n)):
             pass
 
     def act(self, actions: np.ndarray) -> None:
@@ -186,7 +186,7 @@ class TickingColony(ColonyState):
         of vacant slots and of worlds whose episode has ended are ignored. AntsError if no episode
         has started, the colony has a training, or an action is not allowed.
         """
-        self.check_begun()
+        self._check_begun()
         if not self.is_given_actions:
             raise AntsError(
                 "the ants of this colony choose their own actions; call tick instead, or make a "
@@ -201,15 +201,15 @@ class TickingColony(ColonyState):
 
     def end_episode(self) -> None:
         """End the episode: save random streams for the next one, and decay epsilon and the rate."""
-        self.check_finite()
-        self.keep_streams()
+        self._check_finite()
+        self._keep_streams()
         epsilon = self.training.next_epsilon(self.epsilon)
         learning_rate = self.training.next_learning_rate(self.learning_rate)
         self.epsilon, self.learning_rate = epsilon, learning_rate
 
     # Launches
 
-    def pieces(self, n: int) -> Iterator[None]:
+    def _pieces(self, n: int) -> Iterator[None]:
         """Yield after each short launch until n ticks are done; launches cannot be interrupted."""
         end = self.ticks + n
         while self.ticks < end:
@@ -238,7 +238,7 @@ class TickingColony(ColonyState):
         while self.ticks < end:
             piece = min(end - self.ticks, interval - self.ticks % interval)
             piece, threads = self._choice.plan(piece, most)
-            if self.ticks % interval == 0 and self.can_sort:
+            if self.ticks % interval == 0 and self._can_sort:
                 self._sort(threads)
             compiled, began = "ticks" in self._launches, time.perf_counter()
             self._launch_ticks(piece, threads)
@@ -276,7 +276,7 @@ class TickingColony(ColonyState):
             self._launch_parts("sort", 0, parts)
         else:
             began = time.perf_counter()
-            self.sort_ants()
+            self._sort_ants()
             self._sort_seconds += time.perf_counter() - began
 
     def _launch(self, name: str) -> None:
@@ -292,9 +292,9 @@ class TickingColony(ColonyState):
             self._launches[name] = Launch(self._kernel_of(name))
         values = {**kernel_numbers(self), **self.arrays}
         if name == "sort":
-            read = "n_worlds", "n_slots", "orders", "barrier", *self.columns()
+            read = "n_worlds", "n_slots", "orders", "barrier", *self._columns()
             values = {name: values[name] for name in read}
-            values |= {"near_bits": self.near_bits, **self._scratch}
+            values |= {"near_bits": self._near_bits, **self._scratch}
         self._launches[name](values)
 
     def _kernel_of(self, name: str) -> Callable[[Any], Any]:
@@ -302,7 +302,7 @@ class TickingColony(ColonyState):
         from taichi_ants.engines.colony import kernels, learning, sorting
 
         if name == "sort":
-            return partial(sorting.sort, self.columns())
+            return partial(sorting.sort, self._columns())
         if name == "ticks":
             return partial(kernels.ticks, self._variant)
         return partial(kernels.once, self._variant, getattr(learning, name))
@@ -311,7 +311,7 @@ class TickingColony(ColonyState):
     def _variant(self) -> Any:
         from taichi_ants.engines.colony import kernels
 
-        return kernels.variant(self.model, self.schedule)
+        return kernels.variant(self._model, self.schedule)
 
     @cached_property
     def _scratch(self) -> dict[str, np.ndarray]:
@@ -339,7 +339,7 @@ class TickingColony(ColonyState):
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without Taichi's objects, so that copies and pickles work."""
-        made = "_piece", "_sort_seconds", "_launches", "_choice", "_scratch", "model"
+        made = "_piece", "_sort_seconds", "_launches", "_choice", "_scratch", "_model"
         return {name: value for name, value in vars(self).items() if name not in made}
 
 

@@ -18,7 +18,7 @@ class Timetable:
     """The events of a protocol in the episodes of a `Colony`, which imports this module.
 
     A context manager for an episode that has begun. At its end, the numbers of the colony are
-    again those of its beginning; `ColonyState.lay_out` resets the worlds.
+    again those of its beginning; `ColonyState._lay_out` resets the worlds.
 
     Raises:
         AntsError: An event cannot happen in an episode of `length` ticks, or in this colony.
@@ -51,7 +51,7 @@ class Timetable:
             self._interventions.set_task(task)
         colony.training, colony.epsilon = training, epsilon
         if colony.learning_rate != learning_rate:
-            colony.set_learning_rate(learning_rate)
+            colony._set_learning_rate(learning_rate)
 
     def pieces(self, advance: Callable[[Any, int], Iterator[None]], n: int) -> Iterator[None]:
         """Yield when `advance` does, until n ticks are done, with all events on the way."""

@@ -51,6 +51,7 @@ class BatchedEnvironments:
         self.worlds, self.task, self.n = tuple(worlds), task, n
         self._launches: dict[tuple[bool, int], Any] = {}
         self._codes: np.ndarray | None = None  # workspace of rollouts
+        self._cells_on_gpu: Any = None  # which are newer than those in `arrays`
         common = laid_out(self.worlds, task, falls)
         size = common["size"]
         number = np.arange(n, dtype=np.int32) % len(self.worlds)
@@ -140,12 +141,12 @@ class BatchedEnvironments:
             policy: The best actions in each state, as bits, int64 (n_states,), a random stream for
                 each ant, uint64 (n,), and epsilon; or None.
         """
-        runtime.check_on_cpu(runtime.start(), "a rollout of a vector environment runs")
         launch = self._launch(policy is not None, shown[0].size)
         if self._codes is None:
             from taichi_ants.engines.runs.rollout_kernel import CODES_OF_CHUNK, WIDTH
 
-            self._codes = np.empty(-(-self.n // WIDTH) * CODES_OF_CHUNK, np.int64)
+            chunks = 1 if runtime.compiles_for_gpu() else -(-self.n // WIDTH)
+            self._codes = np.empty(chunks * CODES_OF_CHUNK, np.int64)
         steps = max(1, _STEPS_OF_LAUNCH // self.n)
         values = {
             **self._arguments,
@@ -170,17 +171,21 @@ class BatchedEnvironments:
         """Return the `Launch` of a rollout with observations of `width` numbers."""
         if (follows, width) not in self._launches:
             runtime.start()  # configures Taichi before the imports below
-            from taichi_ants.engines.launch import Launch
+            from taichi_ants.engines.launch import Launch, on_device
             from taichi_ants.engines.runs.rollout_kernel import WIDTH, rollout_kernel
             from taichi_ants.engines.runs.step import Rules
 
             names = () if width else self._names
             form = Rules.of(self.task), follows, width, self.n <= WIDTH, names
             self._launches[follows, width] = Launch(partial(rollout_kernel, *form))
+            if runtime.compiles_for_gpu() and self._cells_on_gpu is None:
+                self._cells_on_gpu = cells = on_device(self.arrays["cells"])
+                self._arguments["cells"] = self._of_steps["cells"] = cells
         return self._launches[follows, width]
 
     def snapshot(self, number: int) -> Snapshot:
         """Return the present state of an ant's world; arrays are copies."""
+        self._fetch_cells()
         arrays, grid = self.arrays, self.worlds[0].grid
         own = self._numbers["shared_cells"] + number * (grid.size + EXTRA_CELLS)
         ground, levels = unpack_cells(arrays["cells"][own : own + grid.size])
@@ -189,11 +194,20 @@ class BatchedEnvironments:
         cells, headings = arrays["ant_cells"][one].copy(), arrays["headings"][one].copy()
         return Snapshot(grid, ground, trail, cells, headings, arrays["carries"][one].astype(bool))
 
+    def _fetch_cells(self) -> None:
+        """Copy the cells from the GPU, if they are there."""
+        if self._cells_on_gpu is not None:
+            from taichi_ants.engines.launch import check_not_lost
+
+            check_not_lost([self._cells_on_gpu])
+            self.arrays["cells"][:] = self._cells_on_gpu.to_numpy()
+
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without Taichi's objects, so that copies and pickles work."""
+        self._fetch_cells()
         parts = ("worlds", "task", "n", "_joined", "_others", "_numbers")
         return {name: getattr(self, name) for name in parts}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, _launches={}, _codes=None)
+        vars(self).update(state, _launches={}, _codes=None, _cells_on_gpu=None)
         self._view()

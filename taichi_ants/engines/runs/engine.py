@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,8 @@ _SECONDS = 1.0
 _STEP_NS = 25  # a step of Q-learning on one thread of a slow core
 _WORKSPACE_BYTES = 256 * 2**20
 _MOST_NUMBERS = 2**30  # in one array of a launch, because kernels use 32-bit indices
-_PARALLEL_RUNS_ON_GPU = 4096
+_RUNS_ON_GPU = 2**16  # in parallel, each of which takes a step in about
+_STEP_NS_ON_GPU = 32_000
 MAX_ROLLOUT_STEPS = 1_000_000  # that a launch records
 
 
@@ -210,15 +211,21 @@ class Runs:
         8, see `Learner.memory_for`.
         """
         # Imported here, because Taichi must be configured first; see `runtime`.
-        from taichi_ants.engines.launch import Launch
+        from taichi_ants.engines.launch import Launch, on_device
         from taichi_ants.engines.runs.kernels import run_kernel
         from taichi_ants.engines.runs.step import Rules
 
         task, state = self.task, self.state
-        cells, headings = self.world.first_starts(words_of(self.seeds))
+        start_cells, headings = self.world.first_starts(words_of(self.seeds))
         launch = Launch(partial(run_kernel, Rules.of(task), self.learner, traced))
         falls = task.evaporation_in_training if self.learner else task.evaporation_in_evaluation
         common = {**laid_out([self.world], task, falls), "max_steps": self.max_steps}
+
+        @lru_cache(maxsize=1)
+        def cells_of(n: int) -> Any:
+            """Return room for the cells of n runs; a GPU need not copy it."""
+            cells = np.empty(n * (common["size"] + EXTRA_CELLS), np.int32)
+            return on_device(cells) if n > 0 and runtime.compiles_for_gpu() else cells
 
         def launch_part(runs: slice, episodes: slice, **arrays: Any) -> None:
             n = runs.stop - runs.start
@@ -226,7 +233,7 @@ class Runs:
                 "n_runs": n,
                 "n_episodes": episodes.stop - episodes.start,
                 "regrows": 0,  # food that grows back at once has no effect after a delivery
-                "start_cells": cells[runs],
+                "start_cells": start_cells[runs],
                 "start_headings": headings[runs],
                 "settings": self.settings[runs],
                 "epsilon": state.epsilon[runs],
@@ -239,7 +246,7 @@ class Runs:
                 "q": state.q[runs],
                 "floats": state.floats[runs],
                 "integers": state.integers[runs],
-                "cells": np.empty(n * (common["size"] + EXTRA_CELLS), np.int32),
+                "cells": cells_of(n),
                 "keeps_tables": 0,  # 1 to write the table after each step
                 "outcomes": np.zeros((0, 0, 0), np.int32),  # (3, n, n_episodes): `OUTCOMES`
                 "trace": np.zeros((0, 0), np.int32),  # (n * n_episodes * max_steps, `TRACE`)
@@ -269,11 +276,13 @@ class Runs:
         settings = runtime.start()
         # Other processes do not change the CPU time of this one.
         clock = time.process_time if settings.arch == "cpu" else time.perf_counter
-        workers = settings.threads if settings.arch == "cpu" else _PARALLEL_RUNS_ON_GPU
+        workers, cost = settings.threads, self.cost
+        if settings.arch != "cpu":
+            workers, cost = _RUNS_ON_GPU, self.cost * _STEP_NS_ON_GPU / _STEP_NS
         launch = self.compiled()
         cells = self.world.grid.size + EXTRA_CELLS
         widest = max(array[0].size for array in vars(self.state).values())
-        size = size_of_launch(workers, episodes, self.max_steps, self.cost, cells, widest)
+        size = size_of_launch(workers, episodes, self.max_steps, cost, cells, widest)
         seconds = 0.0
         for runs, part in pieces(len(self), episodes, *size, progress):
             block = np.empty_like(outcomes[:, runs, part], order="C")

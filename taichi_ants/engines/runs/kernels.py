@@ -11,6 +11,7 @@ from typing import Any
 import taichi as ti
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of
+from taichi_ants.engines.launch import has_guards
 from taichi_ants.engines.layout import (
     DELIVERIES,
     DISCOUNT,
@@ -56,6 +57,8 @@ def run_kernel(
     draw, chance_of_draw = BY_VALUES.get(rules.choice, (None, None))
     n_states = rules.observation.n_states
     table = n_states * ROW
+    # A CPU distributes runs one by one, as they are uneven.
+    block = 32 if has_guards(arguments) else 1
 
     @ti.func
     def decide(a: ti.template(), begin, ant, state, explore_below):
@@ -88,7 +91,7 @@ def run_kernel(
     @ti.kernel
     def run(a: arguments):
         memory = ti.static(LearnerArrays(a.q, a.floats, a.integers, n_states))
-        ti.loop_config(block_dim=1)
+        ti.loop_config(block_dim=block)
         for i in range(a.n_runs):
             base, first = i * (a.size + EXTRA_CELLS), i * columns
             at = At(

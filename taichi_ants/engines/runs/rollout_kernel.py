@@ -3,7 +3,8 @@
 A thread takes `WIDTH` ants at a time, and each ant takes up to `LENGTH` steps in a row, so that its
 cells stay in the processor's first cache. The ant writes a code for each step into `codes`. Then
 the thread writes the codes of all its ants as rows of results, with neighbouring ants in
-neighbouring memory.
+neighbouring memory. On a GPU, each ant has a thread, which writes its results itself, because
+neighbouring threads write at the same time.
 """
 
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from typing import Any
 import taichi as ti
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of
+from taichi_ants.engines.launch import has_guards
 from taichi_ants.engines.layout import EXTRA_CELLS, TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.step import (
     Ant,
@@ -38,6 +40,7 @@ CODES_OF_CHUNK = LENGTH * _STRIDE  # of `WIDTH` ants
 # A code is an i64: the state, and from these bits on the result of the step (`layout.TERMINATED`)
 # and the action.
 _RESULT, _ACTION = 32, 40
+_BLOCK = 128  # threads of a GPU that start together
 
 
 @cache
@@ -59,6 +62,7 @@ def rollout_kernel(
     """
     deposit, observe, single = rules.deposit, observe_function(rules), width == 0
     executes = hooks_at(rules.features)["execute"]
+    by_ant = has_guards(arguments) and not single
 
     @ti.func
     def record(a: ti.template(), row, code):
@@ -99,6 +103,8 @@ def rollout_kernel(
                 )
             elif ti.static(single):
                 action = ti.cast(a.taken[i], ti.i32)
+            elif ti.static(by_ant):
+                action = ti.cast(a.taken[t * a.n + i], ti.i32)
             else:
                 action = ti.cast(a.codes[place + t * _STRIDE], ti.i32)
             begins = ti.cast(command == Command.BEGIN, ti.i32)
@@ -146,6 +152,8 @@ def rollout_kernel(
             code = ti.cast(seen, ti.i64) | ti.cast(result, ti.i64) << _RESULT
             if ti.static(single):
                 record(a, i, code)
+            elif ti.static(by_ant):
+                record(a, t * a.n + i, code)
             else:
                 a.codes[place + t * _STRIDE] = code
         a.ant_cells[i], a.headings[i] = ant.cell, ant.heading
@@ -191,10 +199,23 @@ def rollout_kernel(
         else:
             take_rows(a, ant, ants, chunk * _STRIDE * LENGTH)
 
+    @ti.func
+    def take_all(a: ti.template(), i):
+        if ti.static(by_ant):
+            take_steps(a, i, 0, a.n_steps, 0)
+        elif a.commands[i] != Command.WAIT:
+            take_steps(a, i, 0, 1, 0)
+
+    @ti.kernel
+    def rollout_on_gpu(a: arguments):
+        ti.loop_config(block_dim=_BLOCK)
+        for i in range(parts_of(a, numbers).n):
+            take_all(parts_of(a, numbers), i)
+
     @ti.kernel
     def rollout(a: arguments):
         ti.loop_config(block_dim=1, serialize=serial)
         for chunk in range((parts_of(a, numbers).n + WIDTH - 1) // WIDTH):
             take_chunk(parts_of(a, numbers), chunk)
 
-    return rollout
+    return rollout_on_gpu if has_guards(arguments) else rollout

@@ -183,7 +183,7 @@ def test_every_tick_with_castes_and_division_of_labour(kernel):
         if drawn is None or drawn.world.n_nests != nests:
             continue
         colony, plain = both(drawn)
-        if kernel is CASTES[0] and colony.model.epsilon_varies:
+        if kernel is CASTES[0] and colony._model.epsilon_varies:
             continue  # another kernel, which protocols have too
         idle = np.zeros(1, bool)
         for _ in every_tick(colony, plain, (13, None), (9, None)):

@@ -81,7 +81,7 @@ def test_snapshots_have_nests_and_kinds():
 
 def loads_of(colony: Colony, world: int) -> np.ndarray:
     """The loads in cells and of living carriers, by kind."""
-    size, kinds = colony.grid.size, np.zeros(colony.model.n_kinds, int)
+    size, kinds = colony.grid.size, np.zeros(colony._model.n_kinds, int)
     here = np.flatnonzero(colony.snapshot(world).ground == FOOD) + world * size
     loads = colony.arrays["loads"][here] if HELD.is_used(colony.task) else 1
     np.add.at(kinds, colony.arrays["kind_of"][here], loads)
@@ -126,7 +126,7 @@ def test_ants_deliver_to_their_own_queen_alone():
             nests = colony.nests[delivers]
             assert (far[nests, colony.cells[delivers]] == 1).all()
             happened += np.bincount(nests, minlength=2)
-            if not colony.model.ants_change:
+            if not colony._model.ants_change:
                 gained = colony.outcome().returns - returns
                 assert (colony.rewards.sum(axis=1, where=acted) == gained).all()
     assert happened.min() > 3

@@ -115,7 +115,7 @@ def test_every_tick_of_drawn_protocols_equals_the_reference(kernel):
                     twin.begin_episode()
                 with timetable:
                     for tick in range(TICKS):
-                        for _ in timetable.pieces(Colony.pieces, 1):
+                        for _ in timetable.pieces(Colony._pieces, 1):
                             pass
                         for w, (plain, twin) in enumerate(zip(plains, twins, strict=True)):
                             twin.before_tick()

@@ -89,7 +89,7 @@ def test_any_number_of_chunks_gives_the_same(seeds, monkeypatch):
             one.tick(9)
         assert_same({name: colony.arrays[name] for name in colony.stored}, expected.arrays)
         in_kernel._launch_parts("sort", 0, parts)
-        by_numpy.sort_ants()
+        by_numpy._sort_ants()
         assert in_kernel == by_numpy
     assert (in_kernel.numbers != np.arange(30)).any(axis=1).all()
 
@@ -188,12 +188,12 @@ def test_the_internal_order_of_the_ants_does_not_matter():
     rng = np.random.default_rng(0)
     for _ in range(60):
         order = rng.permutation(60)
-        for name in shuffled.columns():
+        for name in shuffled._columns():
             shuffled.arrays[name][:] = shuffled.arrays[name][order]
         plain.tick()
         shuffled.tick()
     back = np.argsort(shuffled.numbers[0])
-    for name in plain.columns():
+    for name in plain._columns():
         assert np.array_equal(shuffled.arrays[name][back], plain.arrays[name]), name
     assert np.array_equal(shuffled.arrays["q"], plain.arrays["q"])
     assert np.array_equal(shuffled.arrays["ground"], plain.arrays["ground"])

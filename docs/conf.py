@@ -1,0 +1,110 @@
+"""The site: `python -m sphinx -W docs build/site` builds it, and makes no request."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlparse
+from xml.sax.saxutils import escape
+
+import tomllib
+from docutils import nodes
+from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.addnodes import download_reference
+
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
+sys.path.insert(0, str(ROOT))
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+URLS = PROJECT.get("urls", {})
+
+project = "Taichi Ants"
+author = "the Taichi Ants contributors"
+release = PROJECT["version"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "notfound.extension",
+    "sphinxext.opengraph",
+]
+exclude_patterns = ["lessons/class"]
+source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
+default_role = "py:obj"
+
+# Pages. Notebooks hold their results, so that building the site runs nothing.
+nb_execution_mode = "off"
+myst_enable_extensions = ["attrs_inline", "colon_fence", "dollarmath"]
+myst_heading_anchors = 4
+myst_update_mathjax = False
+html_math_renderer = "mathml"
+
+html_theme = "furo"
+html_title = project
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sphinx = False
+html_copy_source = False
+if "Repository" in URLS:
+    html_theme_options = {"source_repository": URLS["Repository"], "source_branch": "main"}
+    html_theme_options["source_directory"] = "docs/"
+# Where the site is; sitemaps and cards need it. Without an address, that of a local server.
+html_baseurl = os.environ.get("DOCS_URL", URLS.get("Documentation", "http://localhost:8000/"))
+APPS = ("lab.html", "article.html")  # pages that are complete, and not Sphinx's
+html_extra_path = list(APPS)
+notfound_urls_prefix = urlparse(html_baseurl).path
+
+ogp_site_url = html_baseurl
+ogp_image = "_static/card.png"
+ogp_image_alt = "Ants form lanes between food and their nest, and find a way round a wall."
+ogp_social_cards = {"enable": False}
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
+
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+
+
+def link_apps(app: Any, doctree: nodes.document) -> None:
+    """Make links to the lab and the article links, not downloads."""
+    up = "../" * app.env.docname.count("/")
+    for node in list(doctree.findall(download_reference)):
+        path, _, anchor = node["reftarget"].partition("#")
+        if Path(path).name in APPS:
+            uri = up + Path(path).name + (f"#{anchor}" if anchor else "")
+            node.replace_self(nodes.reference("", "", *node.children, refuri=uri))
+
+
+def visit_math(self: Any, node: Any) -> None:
+    """Write a formula as MathML, which browsers draw and read aloud without a script."""
+    inline = isinstance(node, nodes.math)
+    formula = tex2mathml(re.sub(r"\\big\b", "", node.astext()).replace(r"\dots", r"\ldots"), inline)
+    self.body.append(formula if inline else f'<div class="math">{formula}</div>')
+    raise nodes.SkipNode
+
+
+def write_sitemap(app: Any, error: Exception | None) -> None:
+    """List the pages for search engines."""
+    if error or app.builder.name != "html":
+        return
+    pages = [app.builder.get_target_uri(name) for name in sorted(app.env.found_docs)]
+    lines = [f"<url><loc>{escape(html_baseurl + page)}</loc></url>" for page in (*pages, *APPS)]
+    text = "\n".join(lines)
+    (Path(app.outdir) / "sitemap.xml").write_text(
+        '<?xml version="1.0" encoding="utf-8"?>\n'
+        f'<urlset xmlns="http://www.sitemaps.org/schemas/sitemap/0.9">\n{text}\n</urlset>\n',
+        encoding="utf-8",
+    )
+
+
+def setup(app: Any) -> None:
+    app.connect("doctree-read", link_apps, priority=100)
+    app.connect("build-finished", write_sitemap)
+    app.add_html_math_renderer("mathml", (visit_math, None), (visit_math, None))

@@ -1,0 +1,222 @@
+/* worker.js: a colony of the lab as a session of the live page. It answers the page's messages as
+ * taichi_ants/live/server.py does, with the same frames; of the edits, it knows those of EDITS. */
+
+import { CAPACITY, EMPTY, Engine, FOOD, hexDistance, LEARNERS, ROCK } from "../page/engine.js";
+import { decode } from "../page/link.js";
+import { SCENE } from "../page/worlds.js";
+
+const FRAMES_A_SECOND = 30, FASTEST = 1000; // as in server.py
+const MOST_IN_FLIGHT = 12, STATE_MS = 500;
+const BUSY_MS = 25, TICKS_AT_ONCE = 8;      // of a frame at the fastest speed
+const LEARNER_LABELS = ["Q-learning", "SARSA"];
+
+/** What an edit does to an engine; `value` are its settings. */
+const EDITS = {
+  place: (engine, { what, cells }) => put(engine, cells, { rock: ROCK, food: FOOD }[what]),
+  clear: (engine, { cells }) => put(engine, cells, EMPTY),
+  trail: (engine, { level, cells }) => engine.wasm.lay_scent(brushed(engine, cells), level),
+  ants: (engine, value) => engine.wasm.set_ants(Math.min(value, engine.wasm.room())),
+  epsilon: (engine, value) => {
+    engine.scene.epsilon = value;
+    engine.setNumbers();
+  },
+  learning_rate: (engine, value) => {
+    Object.assign(engine.scene, { rate: value, learns: 1 });
+    engine.setRate();
+  },
+};
+
+function brushed(engine, cells) {
+  const once = [...new Set(cells)];
+  engine.brush.set(once);
+  return once.length;
+}
+
+function put(engine, cells, what) {
+  if (what === undefined) throw new Error("only rock and food can be placed here.");
+  engine.wasm.put(brushed(engine, cells), what);
+}
+
+export class LiveColony {
+  /**
+   * @param {WebAssembly.Module} module colony.wasm
+   * @param {any} headers headers.json
+   * @param {string} link the visit to show, "" for the first screen
+   * @param {(message: string | ArrayBuffer) => void} post
+   */
+  constructor(module, headers, link, post) {
+    const [code, tick] = link.split(";");
+    const { scene, events } = code ? decode(code) : { scene: SCENE, events: [] };
+    Object.assign(this, { module, headers, scene, post, playing: false, speed: 12, sessions: 0, inFlight: 0, behind: false });
+    this.start(events);
+    this.sendBegin();
+    while (this.engine.tick < (Number(tick) || 0)) { // the page can look back at all of it
+      this.advance(1);
+      this.inFlight = 1;
+    }
+    this.sendState();
+  }
+
+  /** Begin a session: with the events of a link, and with the edits of another session. */
+  start(events, edits = [], tick = 0) {
+    this.events = events;
+    this.edits = [];
+    this.engine = new Engine(this.module, this.scene, events);
+    this.capacity = Math.min(2 * this.engine.ants + 64, CAPACITY);
+    this.note();
+    this.pack(false, false);
+    for (const one of [...edits, { tick }]) {
+      if (one.tick > this.engine.tick) {
+        this.engine.pass(one.tick - this.engine.tick);
+        this.note();
+      }
+      if (one.edit) this.apply(one.edit, one.stroke);
+    }
+    this.pack(false, false);
+    Object.assign(this, { playing: false, owed: 0, sessions: this.sessions + 1 });
+  }
+
+  apply(edit, stroke) {
+    const [[name, value]] = Object.entries(edit);
+    if (!Object.hasOwn(EDITS, name)) throw new Error(`this page cannot do that (${name}); the live page of the Python package can.`);
+    EDITS[name](this.engine, value);
+    this.edits.push({ tick: this.engine.tick, edit, stroke });
+  }
+
+  get rate() {
+    const { learner, learns, rate } = this.engine.scene;
+    return learner === LEARNERS.frozen ? 1 : learns * rate;
+  }
+  note() { this.engine.wasm.note_point(this.engine.scene.epsilon); }
+
+  /** A frame: a whole one, or the changes since the last one; `acted` if that is one tick. */
+  pack(whole, acted) {
+    const { wasm, scene } = this.engine, length = wasm.pack_frame(whole, acted, scene.epsilon, this.rate);
+    return wasm.memory.buffer.slice(wasm.array(13), wasm.array(13) + length);
+  }
+
+  /** Pass some ticks, and show them; only a single one shows what the ants did. */
+  advance(ticks) {
+    const { engine } = this, until = performance.now() + BUSY_MS;
+    if (ticks === 1) engine.wasm.pass_acting();
+    else if (ticks < Infinity) engine.pass(ticks);
+    else do engine.pass(TICKS_AT_ONCE); while (performance.now() < until);
+    this.show(this.pack(false, ticks === 1));
+    this.note();
+    if (!engine.later.length || engine.later[0].tick > engine.tick) return;
+    engine.settle();
+    this.show(this.pack(false, false));
+  }
+
+  show(frame) {
+    this.behind ||= this.inFlight >= MOST_IN_FLIGHT;
+    if (this.behind) return;
+    this.inFlight++;
+    this.post(frame);
+  }
+
+  /** Advance while playing. */
+  turn() {
+    if (!this.playing) return;
+    const { speed } = this, now = performance.now();
+    if (now >= this.due) {
+      this.owed += Math.max(1, speed / FRAMES_A_SECOND);
+      this.advance(speed >= FASTEST ? Infinity : Math.floor(this.owed));
+      this.owed %= 1;
+      this.due = Math.max(this.due + 1000 / Math.min(speed, FRAMES_A_SECOND), performance.now());
+      if (now >= this.stateDue) this.sendState();
+    }
+    clearTimeout(this.turning);
+    this.turning = setTimeout(() => this.turn(), this.due - performance.now());
+  }
+
+  say(kind, facts = {}) { this.post(JSON.stringify({ say: kind, ...facts })); }
+
+  sendWhole() {
+    [this.inFlight, this.behind] = [1, false];
+    this.say("snapshot");
+    this.post(this.pack(true, false));
+  }
+
+  sendBegin() {
+    this.say("begin", { session: String(this.sessions), header: this.header(), choices: null, chosen: null });
+    this.sendState();
+    this.sendWhole();
+  }
+
+  sendState() {
+    const { engine } = this, { epsilon, learner } = engine.scene, of = (more) => ({ least: 0, most: 1, edits: null, ...more });
+    const values = {
+      ants: of({ value: engine.ants, least: 1, most: Math.max(this.capacity, engine.ants), step: 1, path: "ants", help: "living ants" }),
+      epsilon: of({ value: epsilon, step: 0.01, path: "epsilon", help: "share of random actions" }),
+    };
+    if (learner !== LEARNERS.frozen) values.learning_rate = of({ value: this.rate, step: 0.001, path: "learning_rate", help: "step size of updates" });
+    this.stateDue = performance.now() + STATE_MS;
+    this.say("state", { playing: this.playing, speed: this.speed, pages: 1, ticks: engine.tick, can_undo: this.edits.length > 0, can_go_back: false, values, works: [] });
+  }
+
+  /** The header of `Recorder.header` in taichi_ants/viewer/recorder.py. */
+  header() {
+    const { headers, scene, engine: { radius, size } } = this, { observation, ...header } = headers.rules[scene.rules], learns = scene.learner !== LEARNERS.frozen;
+    let count = 0;
+    for (let q = -radius; q <= radius; q++) for (let r = -radius; r <= radius; r++) count += Number(hexDistance(q, r) < radius);
+    const cell = size < 2 ** 16 ? "u2" : "u4", types = Object.entries(header.types).map(([name, type]) => [name, type === "cell" ? cell : type]);
+    const numbers = { "learning rate": scene.rate, discount: scene.discount }, about = {
+      world: `${count} cells, ranges ${radius}, ${radius}, ${radius}`, "ants at the start": scene.ants, seed: scene.seed, observation,
+      ...(learns ? { learner: LEARNER_LABELS[scene.learner], table: "shared", ...numbers } : { policy: "frozen", epsilon: scene.epsilon }),
+    };
+    return {
+      ...header, title: `Ants in a world of ${count} cells`, ranges: [radius, radius, radius], types: Object.fromEntries(types), learns, names: headers.names[header.n_states],
+      pheromones: header.pheromones.map((one) => ({ ...one, strongest: scene.level })), groups: header.groups.map((group) => ({ ...group, learns })), about: Object.entries(about).map(([name, value]) => [name, String(value)]),
+    };
+  }
+
+  /** Perform a request, or say why not. */
+  receive(message) {
+    const request = JSON.parse(message), { edits } = this;
+    const acts = {
+      play: () => Object.assign(this, { playing: true, due: performance.now() }),
+      pause: () => Object.assign(this, { playing: false }),
+      speed: ({ value }) => Object.assign(this, { speed: value, due: performance.now() }),
+      step: ({ ticks }) => {
+        this.playing = false;
+        for (let k = 0; k < ticks; k++) this.advance(1);
+      },
+      edit: ({ edit, stroke }) => {
+        this.apply(edit, stroke);
+        this.show(this.pack(false, false));
+      },
+      undo: () => {
+        if (!edits.length) throw new Error("there is nothing to undo: this session has no interventions.");
+        const first = edits.findIndex(({ stroke }) => stroke === edits[edits.length - 1].stroke);
+        this.start(this.events, edits.slice(0, first), edits[first].tick);
+        this.sendBegin();
+      },
+      restart: () => {
+        this.start([]);
+        this.sendBegin();
+      },
+      seen: ({ frames }) => {
+        this.inFlight = Math.max(0, this.inFlight - frames);
+        if (this.behind && !this.inFlight) this.sendWhole();
+      },
+    };
+    try {
+      if (!Object.hasOwn(acts, request.do)) throw new Error(`this page cannot do that (${request.do}); the live page of the Python package can.`);
+      acts[request.do](request);
+    } catch (error) {
+      this.say("error", { words: error.message });
+    }
+    if (request.do !== "seen") this.sendState();
+    this.turn();
+  }
+}
+
+/** In a worker: the first message has what the constructor needs, the others are requests. */
+export function serve() {
+  let colony = null;
+  addEventListener("message", ({ data }) => {
+    if (colony) colony.receive(data);
+    else colony = new LiveColony(new WebAssembly.Module(data.wasm), data.headers, data.link, (message) => postMessage(message));
+  });
+}

@@ -1,0 +1,51 @@
+"""Every Python block of the pages runs, and prints what its page says.
+
+The blocks of a page are one program, from top to bottom. A block after `<!-- not run: reason -->`
+is left out. A comment behind a `print` is what it prints, and so is a `text` block that follows.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import pytest
+from command_lines import ROOT, environment
+from guides import BLOCK
+
+PAGES = {
+    str(path.relative_to(ROOT)): text
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+    if "```python\n" in (text := path.read_text("utf-8"))
+}
+
+
+def program_and_lines(text: str) -> tuple[str, list[str]]:
+    """The program of a page, and the lines that it prints according to the page."""
+    parts, lines, runs = [], [], False
+    for block in BLOCK.finditer(text):
+        if block["language"] == "python":
+            runs = "<!-- not run: " not in text[: block.start()].rpartition("\n\n")[2]
+            if runs:
+                parts.append(block["code"])
+                lines += re.findall(r"^print\(.*\)  +# (.*)$", block["code"], re.M)
+        elif block["language"] == "text" and runs:
+            lines += block["code"].splitlines()
+    return "\n\n".join(parts), lines
+
+
+@pytest.mark.slow  # a process each, and some train
+@pytest.mark.parametrize("page", PAGES)
+def test_the_program_of_a_page_prints_what_the_page_says(page, kernels, tmp_path):
+    program, lines = program_and_lines(PAGES[page])
+    script = tmp_path / "page.py"  # a file, because rules and learners are read from their source
+    script.write_text(program, "utf-8")
+    for folder in ("experiments", "examples"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    how = {"cwd": tmp_path, "env": environment(kernels), "capture_output": True, "text": True}
+    done = subprocess.run([sys.executable, str(script)], timeout=300, check=False, **how)
+    assert done.returncode == 0, done.stderr
+    printed = iter(done.stdout.splitlines())
+    for line in lines:  # in this order, with others between them
+        assert line in printed, (line, done.stdout)
