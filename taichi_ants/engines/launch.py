@@ -139,7 +139,7 @@ def check_not_lost(values: Iterable[Any]) -> None:
     running = ti.lang.impl.get_runtime()
     if any(getattr(value, "taichi", lambda: running)() is not running for value in values):
         raise AntsError(
-            "Taichi was reset, which destroys the state of environments on a GPU; create them again."
+            "Taichi was reset, which destroys environments on a GPU; create them again."
         )
 
 
