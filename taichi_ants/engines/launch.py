@@ -127,7 +127,7 @@ def has_guards(arguments: Any) -> bool:
 
 def on_device(array: np.ndarray) -> Any:
     """Return a copy of an array that stays in the memory of the device between launches."""
-    copy = ti.ndarray(getattr(ti, _kind(array)[0]), array.shape)
+    copy = ti.ndarray(getattr(ti, kind_of(array)[0]), array.shape)
     copy.taichi = ref(ti.lang.impl.get_runtime())
     with runtime.quiet():
         copy.from_numpy(array)
