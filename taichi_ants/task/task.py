@@ -33,9 +33,8 @@ Delivery = Literal["terminates", "truncates"]
 class Traffic(Settings, path="task.traffic"):
     """Rules for entering a cell with an ant on it; by default, as in the paper, no ant may.
 
-    `sentences` describe the settings. A pushed ant gets the reward of a move onto an empty cell.
-    With `follow`, all ants of a queue move at once, but a ring of ants does not move. See
-    `docs/concepts/world_and_ants.md`.
+    A pushed ant gets the reward of a move onto an empty cell. With `follow`, all ants of a queue
+    move at once, but a ring of ants does not move.
     """
 
     sentences: ClassVar[dict[str, str]] = {
