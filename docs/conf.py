@@ -58,7 +58,7 @@ if "Repository" in URLS:
     html_theme_options["source_directory"] = "docs/"
 # Where the site is; sitemaps and cards need it. Without an address, that of a local server.
 html_baseurl = os.environ.get("DOCS_URL", URLS.get("Documentation", "http://localhost:8000/"))
-APPS = ("lab.html", "article.html", "live.html")  # pages that are complete, and not Sphinx's
+APPS = tuple(path.name for path in sorted(DOCS.glob("*.html")))  # complete pages, not Sphinx's
 html_extra_path = list(APPS)
 notfound_urls_prefix = urlparse(html_baseurl).path
 

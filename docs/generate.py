@@ -163,7 +163,10 @@ def command(name: str) -> str:
                 lines.append([f"`{words}`", formatter._expand_help(action) if action.help else ""])
         about = " ".join((parser.description or "").split())
         head = f"### `{parser.prog}`\n\n" if kinds else ""
-        what = table(("Option", "Meaning"), ([a.replace("|", "\\|"), b.replace("|", "\\|")] for a, b in lines))
+        what = table(
+            ("Option", "Meaning"),
+            ([a.replace("|", "\\|"), b.replace("|", "\\|")] for a, b in lines),
+        )
         parts.append(f"{head}{about}\n\n```\n{usage.removeprefix('usage: ')}\n```\n\n{what}{more}")
     return "\n\n".join(parts)
 
@@ -209,6 +212,11 @@ MODULES = (
 )
 
 
+def imported(module: str) -> Any:
+    """Return a module of the package; "" is the package."""
+    return import_module(f"taichi_ants.{module}".rstrip("."))
+
+
 def public_names(module: Any) -> list[str]:
     """Return the public names of a module that are not modules; by default, what it defines."""
     names = getattr(module, "__all__", None)
@@ -233,8 +241,8 @@ def api(module: str, seen: dict[int, str]) -> str:
 
     Names in `seen`, of pages before, are links.
     """
-    name = f"taichi_ants.{module}".rstrip(".")
-    found = import_module(name)
+    found = imported(module)
+    name = found.__name__
     here, elsewhere, data = [], [], []
     for public in sorted(public_names(found), key=str.lower):
         value = getattr(found, public)
