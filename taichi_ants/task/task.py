@@ -348,7 +348,8 @@ def fetching() -> Task:
     """Return the paper's task without its reward for moves onto a trail or nearer to the queen.
 
     An episode of one ant rewards only one pick-up and one delivery. Therefore circling does not
-    pay, and the best policy delivers, at discounts from 0.9 to 0.999 (`docs/how-to/train_an_agent.md`).
+    pay, and the best policy delivers, at discounts from 0.9 to 0.999; see
+    `docs/how-to/train_an_agent.md`.
     """
     return Task(rewards=Rewards(shaping=0))
 

@@ -9,7 +9,7 @@ import { Random } from "../../../lab/lessons/random.js";
 export const ACTS = ["left", "forward", "right", "pick up", "deliver"];
 const CUE = 2, CARRIES = 64; // the code of a trail or of a way home; the first observation with food
 const ANTS = 2000, VISITS = 500, PLACES = 5;                  // of lesson 1
-const STEPS_HOME = 34, QUEEN = [-9, 0], COLUMNS = 21, MIDDLE = 10; // of the paper's world
+const STEPS_HOME = 34, QUEEN_AT = [-9, 0], COLUMNS = 21, CENTRE = 10; // of the paper's world
 const LEARNER = { learner: "q_learning", rate: 0.1, discount: 0.9, epsilon: 0.3, decay: 0.99 };
 const SARSA = { learner: "sarsa", rate: 0.01, discount: 0.9, epsilon: 0.3, decay: 0.995 };
 const FAR = { ...LEARNER, learner: "dyna_q", discount: 0.99, planningSteps: 5 };
@@ -201,7 +201,7 @@ async function behaviours(lone, show, truncates) {
   return { head: ["of 40 ants", ...BEHAVIOURS], rows };
 }
 
-const fromQueen = (cell) => hexDistance(cell % COLUMNS - MIDDLE - QUEEN[0], Math.floor(cell / COLUMNS) - MIDDLE - QUEEN[1]);
+const fromQueen = (cell) => hexDistance(cell % COLUMNS - CENTRE - QUEEN_AT[0], Math.floor(cell / COLUMNS) - CENTRE - QUEEN_AT[1]);
 
 // All of them ------------------------------------------------------------------------------------
 
