@@ -229,7 +229,7 @@ def public_names(module: Any) -> list[str]:
 # Data of the package, whose values have no docstrings.
 DATA = {
     "BUILT_IN": "The measures of the package by name, see [measures](../measures.md).",
-    "KINDS": "The kinds of rules by name, with their results and [inputs](../rules.md).",
+    "KINDS": "The kinds of rules by name, with their results and [inputs](../rule_inputs.md).",
     "LEARNERS": "The learners of the reference by name, in plain Python.",
     "OBSERVATIONS": "The observations of the reference by name, in plain Python.",
     "PAUSE": "Seconds for which an animation shows its last picture.",
