@@ -50,7 +50,7 @@ def settings_table(owner: Any, path: str = "") -> str:
 
 def groups_of(owner: Any) -> Iterator[str]:
     """Yield the tables of a class of settings and of its groups, each after its docstring."""
-    about = (owner.__doc__ or "").partition("\n\nAttributes:")[0]
+    about = re.split(r"\n\n(?:Attributes:|>>> )", owner.__doc__ or "")[0]
     yield f"### `{owner.path}`: {owner.__name__}\n\n{about}"
     if declared(owner):
         yield settings_table(owner)
