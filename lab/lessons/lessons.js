@@ -32,6 +32,8 @@ function plotOf(lines, across) {
 
 /** The recorded steps of lone ants: a map, a slider, and what happened in a step. */
 class Walk {
+  place; walks; bar;
+
   constructor(place, walks, at = 0) {
     const hexagon = STEPS.map(([q, r]) => centre(q, r)).map(([x, y]) => `${(y / 1.82).toFixed(2)},${(x / 1.82).toFixed(2)}`).join(" ");
     const cells = [];
@@ -89,6 +91,8 @@ class Walk {
 
 /** The place of an experiment: an editor if there is something to write, a button, and the result. */
 class Place {
+  element; page; experiment; button; result; group = null;
+
   constructor(element, page) {
     [this.element, this.page, this.experiment] = [element, page, EXPERIMENTS[element.dataset.run]];
     const { ask, code, answer, now, label = code ? "Check" : "Run" } = this.experiment;
@@ -128,6 +132,8 @@ class Place {
 
 /** A prediction, and what waits for it: one experiment, and everything after it up to the next section. */
 class Group {
+  field; hidden; teachers;
+
   constructor(label, teachers) {
     [this.field, this.hidden, this.teachers] = [label.querySelector("textarea"), [], teachers];
     label.insertAdjacentHTML("afterend", '<p class="acts"><button class="seeds">Show the recorded result</button></p>');

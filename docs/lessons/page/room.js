@@ -22,6 +22,7 @@ export const PLAN = {
 }`,
 };
 
+/** @param {number[]} values */
 const largest = ([a, b, c, d, e, f]) => Math.max(a, b, c, d, e, f);
 
 function learn(q, { s, a, r, next, over }, bonus = 0) {
