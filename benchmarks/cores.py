@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from measuring import PAGE, machine, publish
+from measuring import machine, publish
 
 from taichi_ants import Colony, Task, TrainingConfig, runtime, train, worlds
 from taichi_ants.analysis.tables import MISSING, Table, figure, plain_text, thousands
@@ -35,12 +35,18 @@ def pace_of(work: Callable[[], int]) -> float:
     return work() / (time.perf_counter() - began) / 1e6
 
 
-def colony_works(ants: int, n_worlds: int) -> Iterator[tuple[str, Work]]:
-    """Yield the kernels alone and `tick`, with eight cells per ant."""
+def colony_of(ants: int, n_worlds: int) -> Colony:
+    """Return a colony whose ants learn while they forage, with eight cells for each of them."""
     side = max(6, round((8 * ants / 3) ** 0.5) + 1)
     world = worlds.open_world(1, (side, side, side))
     colony = Colony(world, foraging(), SARSA, range(n_worlds), ants, start="spread")
     colony.begin_episode()
+    return colony
+
+
+def colony_works(ants: int, n_worlds: int) -> Iterator[tuple[str, Work]]:
+    """Yield the kernels alone and `tick`."""
+    colony = colony_of(ants, n_worlds)
     steps = ants * n_worlds
     ticks = max(2, _STEPS // steps)
 
@@ -153,7 +159,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         made = table(measured(given.rounds), given.rounds)
         print(plain_text([made], 120), end="")
         if given.publish:
-            publish("cores", [made], PAGE)
+            publish("performance_cores", [made])
 
     run_command(command)
 
