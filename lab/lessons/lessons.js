@@ -218,4 +218,9 @@ class Lessons extends Stage {
   }
 }
 
-Object.assign(window, { lessons: new Lessons() });
+try {
+  Object.assign(window, { lessons: new Lessons() });
+} catch (error) {
+  document.querySelector(".lead").insertAdjacentHTML("afterend", "<p>This browser cannot run the experiments below: they need WebAssembly with SIMD. The text can be read.</p>");
+  throw error;
+}
