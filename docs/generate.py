@@ -163,7 +163,10 @@ def command(name: str) -> str:
                 lines.append([f"`{words}`", formatter._expand_help(action) if action.help else ""])
         about = " ".join((parser.description or "").split())
         head = f"### `{parser.prog}`\n\n" if kinds else ""
-        what = table(("Option", "Meaning"), ([a.replace("|", "\\|"), b.replace("|", "\\|")] for a, b in lines))
+        what = table(
+            ("Option", "Meaning"),
+            ([a.replace("|", "\\|"), b.replace("|", "\\|")] for a, b in lines),
+        )
         parts.append(f"{head}{about}\n\n```\n{usage.removeprefix('usage: ')}\n```\n\n{what}{more}")
     return "\n\n".join(parts)
 
