@@ -175,12 +175,12 @@ def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
     columns = ["M steps/s", "measured", "goal", "share of it"]
     return [
         *([Table("Speed on a GPU", columns, paces)] if paces else []),
-        Table("Results", ["", "cases", "equal to a CPU's", "not equal"], results, [about]),
+        Table("Results", ["", "cases", "equal to a CPU's", "others"], results, [about]),
     ]
 
 
 def summary(kind: str, rows: dict[str, list[str]]) -> list[str]:
-    """Return the row of all cases of a kind: how many are equal, and which are not."""
+    """Return the row of all cases of a kind: how many are equal, and the others."""
     found = {case: row[1] for case, row in rows.items() if case.startswith(kind)}
     others = [f"{case}: {result}" for case, result in found.items() if result != "equal"]
     return [kind, str(len(found)), str(len(found) - len(others)), "; ".join(others)]
