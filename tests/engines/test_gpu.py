@@ -110,7 +110,9 @@ def test_divisors_are_guarded_against_a_compiler_that_multiplies_by_reciprocals(
 def run_script(text, folder, **variables):
     script = folder / "script.py"  # Taichi reads the source of kernels
     script.write_text(text, encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent), **variables}
+    root = PACKAGE.parent
+    path = os.pathsep.join(map(str, (root, root / "tests/golden", root / "tests/support")))
+    environment = {**os.environ, "PYTHONPATH": path, **variables}
     done = subprocess.run([sys.executable, script], env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
@@ -161,8 +163,8 @@ def test_environments_on_a_gpu_end_with_a_reset_of_taichi(as_on_gpu):
 
 FOR_CUDA = """
 import os
-import numpy as np, taichi as ti
-from taichi_ants import learners, runtime, train, worlds
+import drawing, numpy as np, taichi as ti
+from taichi_ants import Colony, learners, runtime, train, worlds
 from taichi_ants.envs.forage import HexForageVectorEnv
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
@@ -188,6 +190,12 @@ envs.reset(seed=1)
 envs.step(np.ones(3, int))
 envs.rollout("random", 5)
 envs.rollout(np.ones((5, 3), int))
+for group in ("castes_fields", "labour_soft", "own_deposit"):
+    for _, drawn in drawing.colonies_of(group, 1):
+        colony = Colony(*drawn.model, **drawn.options)
+        colony.begin_episode()
+        colony.tick()
+assert colony.schedule == "by_ant"
 """
 
 
@@ -200,7 +208,7 @@ def test_compiled_for_a_gpu_no_product_is_fused_and_no_quotient_approximated(tmp
     run_script(FOR_CUDA, tmp_path, **folders)
     assert {"div.approx", "fma.rn"} <= changed_arithmetic(tmp_path / "1.ptx")
     files = [*(tmp_path / "guarded").glob("*.ptx")]
-    assert len(files) > 12
+    assert len(files) > 20
     for path in files:
         assert not changed_arithmetic(path), path
 
