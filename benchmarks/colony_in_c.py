@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from measuring import PAGE, Work, a_ratio, machine, pace, publish
+from measuring import Work, a_ratio, machine, pace, publish
 from throughput import ENGINE, compile_c, compiler, compiler_note
 
 from taichi_ants import Task, TrainingConfig, runtime, worlds
@@ -203,7 +203,7 @@ def compare(
     made = table(found, threads, compiler_note(command, threads))
     print(plain_text([made], 120), end="")
     if publishes:
-        publish("colony", [made], PAGE)
+        publish("performance_colony", [made])
     for (rules, n), paces in found.items():
         ratio = float(np.median(paces[:, 0] / paces[:, 1]))
         if ratio < least:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from measuring import PAGE, machine, publish
+from measuring import machine, publish
 
 from taichi_ants import Colony, Task, TrainingConfig, runtime, train, worlds
 from taichi_ants.analysis.tables import MISSING, Table, figure, plain_text, thousands
@@ -159,7 +159,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         made = table(measured(given.rounds), given.rounds)
         print(plain_text([made], 120), end="")
         if given.publish:
-            publish("cores", [made], PAGE)
+            publish("performance_cores", [made])
 
     run_command(command)
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from measuring import FIGURES, PAGE, Work, machine, pace, publish
+from measuring import FIGURES, Work, machine, pace, publish
 from systems.ours import SARSA
 
 from taichi_ants import Task, TrainingConfig, World, runtime, train, worlds
@@ -289,7 +289,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(plain_text(made, 120), end="")
         if given.publish:
             draw(found)
-            publish("growth", made, PAGE)
+            publish("performance_growth", made)
 
     run_command(command)
 

@@ -1,9 +1,10 @@
-"""Tools for benchmarks: a description of the machine, measured paces, tables in a docs page."""
+"""Tools for benchmarks: a description of the machine, measured paces, published tables."""
 
 from __future__ import annotations
 
 import math
 import platform
+import sys
 import time
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
@@ -12,13 +13,11 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from taichi_ants import runtime
-from taichi_ants.analysis.tables import Table
-from taichi_ants.errors import AntsError
-from taichi_ants.files import read_text, write_text
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "results" / "performance.md"
-FIGURES = ROOT / "docs" / "figures"
+sys.path.append(str(ROOT / "experiments"))
+from published import FIGURES as FIGURES  # noqa: E402
+from published import publish as publish  # noqa: E402
 
 Work = Callable[[], int]  # does some work, and returns the number of steps in it
 
@@ -59,18 +58,3 @@ def pace(work: Work, seconds: float) -> tuple[float, float]:
         steps += work()
     wall, cpu = time.perf_counter() - began, time.process_time() - cpu
     return steps / wall, cpu * 1e9 / steps
-
-
-def publish(name: str, tables: Sequence[Table], page: Path) -> None:
-    """Replace the text between `<!-- name -->` and `<!-- /name -->` of a page by tables.
-
-    Raises:
-        AntsError: The page lacks these marks, or cannot be read or written.
-    """
-    text, first, last = read_text(page), f"<!-- {name} -->\n", f"<!-- /{name} -->"
-    before, begins, rest = text.partition(first)
-    _, ends, after = rest.partition(last)
-    if not begins or not ends:
-        raise AntsError(f"{page} lacks the lines {first.strip()} and {last}; add both lines.")
-    new = "\n".join(table.markdown() for table in tables)
-    write_text(page, f"{before}{first}\n{new}\n{last}{after}")

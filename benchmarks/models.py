@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from measuring import PAGE, machine, pace, publish
+from measuring import machine, pace, publish
 from systems.ours import SARSA
 
 from taichi_ants import Task, World, runtime, worlds
@@ -114,7 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         made = table(measured(given.ants, given.rounds, 0.5), given.ants)
         print(plain_text([made], 120), end="")
         if given.publish:
-            publish("models", [made], PAGE)
+            publish("performance_models", [made])
 
     run_command(command)
 

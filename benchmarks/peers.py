@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from typing import NamedTuple
 
 import numpy as np
-from measuring import FIGURES, PAGE, Work, machine, pace, publish
+from measuring import FIGURES, Work, machine, pace, publish
 
 from taichi_ants.analysis import style
 from taichi_ants.analysis.tables import Table, figure, interval, plain_text, thousands
@@ -219,7 +219,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(plain_text(made, 130), end="")
         if given.publish:
             draw(found)
-            publish("peers", made, PAGE)
+            publish("performance_peers", made)
 
     run_command(command)
 

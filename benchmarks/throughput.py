@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from measuring import PAGE, a_ratio, machine, publish
+from measuring import a_ratio, machine, publish
 from systems.paper_world import GRID
 
 from taichi_ants import Task, TrainingConfig, World, runtime, train, worlds
@@ -289,7 +289,7 @@ def compare(seeds: int, rounds: int, threads: int, least: float, publishes: bool
     made = table(list(yardsticks), steps, seconds, seeds, threads, compiled)
     print(plain_text([made], 120), end="")
     if publishes:
-        publish("training", [made], PAGE)
+        publish("performance_training", [made])
     if not yardsticks:
         print("There is no C compiler (CC, clang, gcc or cc), so the comparison is skipped.")
         return

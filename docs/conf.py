@@ -10,10 +10,14 @@ from typing import Any
 from urllib.parse import urlparse
 from xml.sax.saxutils import escape
 
-import tomllib
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.addnodes import download_reference
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
@@ -38,7 +42,7 @@ default_role = "py:obj"
 
 # Pages. Notebooks hold their results, so that building the site runs nothing.
 nb_execution_mode = "off"
-myst_enable_extensions = ["attrs_inline", "colon_fence", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 myst_update_mathjax = False
 html_math_renderer = "mathml"
@@ -54,7 +58,7 @@ if "Repository" in URLS:
     html_theme_options["source_directory"] = "docs/"
 # Where the site is; sitemaps and cards need it. Without an address, that of a local server.
 html_baseurl = os.environ.get("DOCS_URL", URLS.get("Documentation", "http://localhost:8000/"))
-APPS = ("lab.html", "article.html")  # pages that are complete, and not Sphinx's
+APPS = ("lab.html", "article.html", "lessons.html", "live.html")  # complete pages, not Sphinx's
 html_extra_path = list(APPS)
 notfound_urls_prefix = urlparse(html_baseurl).path
 

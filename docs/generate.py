@@ -13,7 +13,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
-from inspect import isclass, ismodule
+from inspect import isclass, isfunction, ismodule
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -25,7 +25,7 @@ sys.path.insert(0, str(DOCS.parent))
 import taichi_ants  # noqa: E402
 from taichi_ants import envs, learners, measures, rules, task, worlds  # noqa: E402, F401
 from taichi_ants.commands import COMMANDS  # noqa: E402
-from taichi_ants.settings import Named, all_of, declared  # noqa: E402
+from taichi_ants.settings import Named, declared  # noqa: E402
 from taichi_ants.studies import command_line  # noqa: E402
 from taichi_ants.task import observations  # noqa: E402
 
@@ -37,28 +37,41 @@ def table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     return "\n".join(f"| {' | '.join(' '.join(c.split()) for c in line)} |" for line in lines)
 
 
-def rows_of(owner: Any) -> Iterator[list[str]]:
-    """Yield the settings of a class or function, and of its groups."""
-    for one in all_of(owner):
+def settings_table(owner: Any, path: str = "") -> str:
+    """Return the settings of a class or function, without those of its groups."""
+    rows = []
+    for one in declared(owner):
         values, default, meaning = one.in_words
-        if one.kind is Named or not one.is_group:
-            yield [f"`{one.path}`", values, default, meaning]
-        if one.kind is Named:
-            yield from rows_of(one.entry)
+        if one.is_group:
+            values = f"{values}; see [below](#{one.path.replace('.', '').lower()}-{one.kind.__name__.lower()})"
+        rows.append([f"`{one.path}`", values, default, meaning])
+    return table(("Setting", "Values", "Default", "Meaning"), rows)
 
 
-def settings(name: str) -> str:
-    """Return the settings of a class, of a learner, of the built-in rules, or of a world."""
-    kind, _, entry = name.partition(":")
-    if kind == "learner":
-        owner: Any = learners.get(entry).hyperparameters
-    elif kind == "world":
-        owner = worlds.registry.WORLDS.get(entry)
-    elif kind == "rule":
-        owner = rules.get(entry).settings
+def groups_of(owner: Any) -> Iterator[str]:
+    """Yield the tables of a class of settings and of its groups, each after its docstring."""
+    about = (owner.__doc__ or "").partition("\n\nAttributes:")[0]
+    yield f"### `{owner.path}`: {owner.__name__}\n\n{about}"
+    if declared(owner):
+        yield settings_table(owner)
+    for one in declared(owner):
+        if one.is_group or one.kind is Named:
+            yield from groups_of(one.entry if one.kind is Named else one.kind)
+
+
+def settings(kind: str) -> str:
+    """Return the settings of a class with its groups, or of all learners or worlds that have some."""
+    if kind == "learners":
+        owners = {name: learners.get(name).hyperparameters for name in learners.names()}
+    elif kind == "worlds":
+        owners = {name: worlds.registry.WORLDS.get(name) for name in worlds.names()}
     else:
-        owner = getattr(taichi_ants, kind)
-    return table(("Setting", "Values", "Default", "Meaning"), rows_of(owner))
+        return "\n\n".join(groups_of(getattr(taichi_ants, kind)))
+    return "\n\n".join(
+        f"### `{name}`\n\n{settings_table(owner)}"
+        for name, owner in owners.items()
+        if declared(owner)
+    )
 
 
 def listed(registry: str) -> str:
@@ -150,7 +163,10 @@ def command(name: str) -> str:
                 lines.append([f"`{words}`", formatter._expand_help(action) if action.help else ""])
         about = " ".join((parser.description or "").split())
         head = f"### `{parser.prog}`\n\n" if kinds else ""
-        what = table(("Option", "Meaning"), ([a.replace("|", "\\|"), b.replace("|", "\\|")] for a, b in lines))
+        what = table(
+            ("Option", "Meaning"),
+            ([a.replace("|", "\\|"), b.replace("|", "\\|")] for a, b in lines),
+        )
         parts.append(f"{head}{about}\n\n```\n{usage.removeprefix('usage: ')}\n```\n\n{what}{more}")
     return "\n\n".join(parts)
 
@@ -180,47 +196,72 @@ MAKERS: dict[str, Callable[[str], str]] = {
     "commands": commands,
     "spaces": spaces,
 }
-_BLOCK = re.compile(r"(<!-- generated: (\w+) ?(\S*) -->\n).*?(\n<!-- end -->)", re.DOTALL)
+_BLOCK = re.compile(r"(<!-- generated: (\w+) (\S+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def filled(page: str) -> str:
     """Return a page with its generated parts."""
-    return _BLOCK.sub(lambda m: f"{m[1]}\n{MAKERS[m[2]](m[3])}\n{m[4]}", page)
+    return _BLOCK.sub(lambda m: f"{m[1]}\n{MAKERS[m[2]](m[3])}\n\n{m[4]}", page)
 
 
 MODULES = (
-    *("", "worlds", "task", "learners", "measures", "rules", "envs", "rendering", "offline"),
-    *("analysis", "testing", "reference"),
+    *("", "worlds", "task", "task.observations", "task.states", "interventions", "learners"),
+    *("learners.policies", "learners.memory", "measures", "rules", "envs", "envs.colony_v0"),
+    *("rendering", "viewer", "offline", "analysis.statistics", "analysis.behaviour"),
+    *("analysis.bounds", "analysis.style", "testing", "reference"),
 )
 
 
 def public_names(module: Any) -> list[str]:
-    """Return the public names of a module that are not modules."""
-    return [
-        name
-        for name in module.__all__
-        if not name.startswith("_") and not ismodule(getattr(module, name))
-    ]
+    """Return the public names of a module that are not modules; by default, what it defines."""
+    names = getattr(module, "__all__", None)
+    if names is None:
+        own = {n: v for n, v in vars(module).items() if isclass(v) or isfunction(v)}
+        names = [n for n, v in own.items() if v.__module__ == module.__name__]
+    return [n for n in names if not n.startswith("_") and not ismodule(getattr(module, n))]
 
 
-def api(module: str) -> str:
-    """Return the page of a module: a directive for each public name, which Sphinx fills."""
+# Data of the package, whose values have no docstrings.
+DATA = {
+    "BUILT_IN": "The measures of the package by name, see [measures](../measures.md).",
+    "KINDS": "The kinds of rules by name, with their results and [inputs](../rules.md).",
+    "LEARNERS": "The learners of the reference by name, in plain Python.",
+    "OBSERVATIONS": "The observations of the reference by name, in plain Python.",
+    "PAUSE": "Seconds for which an animation shows its last picture.",
+}
+
+
+def api(module: str, seen: dict[int, str]) -> str:
+    """Return the page of a module: a directive for each public name, which Sphinx fills.
+
+    Names in `seen`, of pages before, are links.
+    """
     name = f"taichi_ants.{module}".rstrip(".")
     found = import_module(name)
-    about = (found.__doc__ or "").strip()
-    lines = [f"# {name}", "", about.replace("::\n", ":\n"), "", "```{eval-rst}"]
-    lines += [f".. currentmodule:: {name}", ""]
+    here, elsewhere, data = [], [], []
     for public in sorted(public_names(found), key=str.lower):
         value = getattr(found, public)
-        kind = "class" if isclass(value) else "function" if callable(value) else "data"
-        lines += [f".. auto{kind}:: {public}", *(["   :members:"] if kind == "class" else []), ""]
-    return "\n".join([*lines, "```", ""])
+        if public in DATA:
+            data.append(f"`{public}`\n: {DATA[public]}\n")
+        elif id(value) in seen:
+            elsewhere.append(f"{{py:obj}}`{seen[id(value)]}`")
+        else:
+            seen[id(value)] = f"{name}.{public}"
+            more = ["   :members:"] if isclass(value) else []
+            here += [f".. auto{'class' if isclass(value) else 'function'}:: {public}", *more, ""]
+    lines = [f"# {name}", "", (found.__doc__ or "").strip().replace("::\n", ":\n"), ""]
+    if elsewhere:
+        lines += [f"Also here: {', '.join(elsewhere)}.", ""]
+    if here:
+        lines += ["```{eval-rst}", f".. currentmodule:: {name}", "", *here, "```", ""]
+    return "\n".join([*lines, *data])
 
 
 def pages() -> dict[Path, str]:
     """Return the text of each generated page, and of each page with generated parts."""
+    seen: dict[int, str] = {}
     made = {
-        REFERENCE / "api" / f"{module or 'taichi_ants'}.md": api(module) for module in MODULES
+        REFERENCE / "api" / f"{module or 'taichi_ants'}.md": api(module, seen) for module in MODULES
     }
     for path in sorted(REFERENCE.glob("*.md")):
         text = path.read_text("utf-8")

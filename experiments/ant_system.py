@@ -2,7 +2,7 @@
 
 For each method and world, the script prints the number of colonies that find a shortest path from
 the queen to food, and the median of the iterations in which they find it. It also prints the mean
-length of the ants' tours in the first and the last iteration. See docs/models/index.md.
+length of the ants' tours in the first and the last iteration. See docs/models/ant_system.md.
 """
 
 # No `from __future__ import annotations`, because Taichi reads the annotations of kernels.
@@ -15,11 +15,13 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import Annotated, Literal, get_args
 
     import numpy as np
+    import published
     import taichi as ti
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
 
     from taichi_ants import AntsError, World, runtime, worlds
+    from taichi_ants.analysis.tables import Table
     from taichi_ants.arguments import checked_world
     from taichi_ants.arithmetic.numbers import power
     from taichi_ants.arithmetic.random_bits import advance, bits_of, high_word
@@ -36,7 +38,7 @@ METHODS: tuple[str, ...] = get_args(Method)
 EVAPORATION = {"ant_system": 0.5, "max_min": 0.02}
 # MAX-MIN: probability of the best tour after convergence, from the paper.
 P_BEST = 0.05
-HEAD = f"{'world':20} {'method':11} shortest  found by  iteration  first and last mean length"
+COLUMNS = "World", "method", "shortest", "found by", "iteration", "first mean", "last mean"
 
 f64_1d, f64_2d = (ti.types.ndarray(dtype=ti.f64, ndim=n) for n in (1, 2))
 i32_1d, i32_2d = (ti.types.ndarray(dtype=ti.i32, ndim=n) for n in (1, 2))
@@ -203,7 +205,7 @@ def search(
     """Return results of independent colonies that search for the shortest path to food.
 
     The methods are Ant System (Dorigo, Maniezzo and Colorni 1996) and MAX-MIN Ant System (Stuetzle
-    and Hoos 2000); for their rules and papers, see docs/models/index.md. Every ant walks at random
+    and Hoos 2000); for their rules and papers, see docs/models/ant_system.md. Every ant walks at random
     from the queen until it reaches food. Its walk without loops is its *tour*.
 
     With "ant_system", all ants deposit. With "max_min", the best ant of the iteration does, and tau
@@ -276,6 +278,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     evaporation = "share that evaporates per iteration (default: 0.5; for MAX-MIN, 0.02)"
     add("--evaporation", type=float, metavar="RHO", help=evaporation)
     add("--seed", type=whole_number(), default=0, metavar="N", help="seed of all colonies")
+    add("--publish", action="store_true", help="write the table to the docs")
     command_line.add_threads(parser)
     return parser.parse_args(arguments)
 
@@ -283,25 +286,23 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def print_table(settings: argparse.Namespace) -> None:
     """Print a row for each world and method, after checking all of them."""
     maps = {name: worlds.build(name, settings.seed) for name in settings.worlds}
-    rows: list[str] = []
+    rows: list[list[str]] = []
     with command_line.progress_bar("Ant colony optimisation") as progress:
         for (name, world), method in product(maps.items(), METHODS):
-            rows.append(f"{name:20} {method:11} {row(settings, world, method)}")
+            rows.append([name, method, *row(settings, world, method)])
             progress(len(rows) / (len(maps) * len(METHODS)))
-    print(HEAD, *rows, sep="\n")
+    published.show("ant_system", [Table("", COLUMNS, rows, text_columns=2)], settings.publish)
 
 
-def row(settings: argparse.Namespace, world: World, method: Method) -> str:
+def row(settings: argparse.Namespace, world: World, method: Method) -> list[str]:
     """Return the row of a method in a world."""
     names = ("iterations", "ants", "colonies", "evaporation", "seed", "threads")
     result = search(world, method, **{name: getattr(settings, name) for name in names})
     found = result.found[result.found > 0]
     when = f"{np.median(found):.0f}" if len(found) else "-"
     first, last = np.nanmean(result.mean[:, [0, -1]], axis=0)
-    return (
-        f"{result.shortest:8} {len(found):5}/{settings.colonies:<4}"
-        f"{when:>9} {first:11.1f} {last:8.1f}"
-    )
+    share = f"{len(found)}/{settings.colonies}"
+    return [f"{result.shortest}", share, when, f"{first:.1f}", f"{last:.1f}"]
 
 
 if __name__ == "__main__":

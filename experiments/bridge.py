@@ -19,10 +19,12 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     import bridge_report as shown
     import numpy as np
+    import published
     from bridge_report import BRIDGES, CASES, LATE, LOADS, WINDOWS, Case, bridges
     from colony import LEARNING, scheduled
 
     from taichi_ants import AntsError, Colony, Life, Task, files
+    from taichi_ants.analysis.tables import plain_text
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.interventions import Clear, Place
     from taichi_ants.studies import command_line
@@ -145,7 +147,10 @@ def tables(plan: Plan, results: Results) -> str:
         folder = results.folder / "figures"
         shown.draw(folder / "bridge.png", found, plan.ticks)
         shown.draw_late(folder / "late.png", found, plan.ticks)
-    return shown.report(found, plan.ticks)
+    report = shown.tables(found, plan.ticks)
+    for name, one in report.items():
+        published.write(results.folder / "tables" / f"bridge_{name}.json", [one])
+    return plain_text(list(report.values()), 120)
 
 
 def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0) -> np.ndarray:

@@ -14,7 +14,7 @@ from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import LEAST_SEEDS
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.analysis.sweeps import draw_lines
-from taichi_ants.analysis.tables import Table, interval, number, plain_text, sentence
+from taichi_ants.analysis.tables import Table, interval, number, sentence
 from taichi_ants.errors import count
 
 if TYPE_CHECKING:
@@ -103,42 +103,44 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
     ]
 
 
-def report(found: Crossings, ticks: int) -> str:
-    """Return tables of the late shares of all designs and of the shares after a late opening."""
-    headers = [*asdict(Case())]
-    lines, late = [], []
-    for design, bridges in found.items():
-        row = [*map(str, asdict(design).values())]
-        for bridge, crossed in bridges.items():
-            if bridge != LATE:
+def tables(found: Crossings, ticks: int) -> dict[str, Table]:
+    """Return tables of late shares by rules and food, then by setting, and after a late opening."""
+    lines, late, varied = [], [], []
+    for design, crossed_by in found.items():
+        row = [design.rules, "aside" if design.aside else "ahead"]
+        for bridge, crossed in crossed_by.items():
+            if bridge == LATE:
+                for k, load in enumerate(LOADS):
+                    *first, last = _shares(crossed)[WINDOWS // 2 :, k]
+                    means = [number(_percent(values)[0], 0) for values in first]
+                    colonies = f"{np.count_nonzero(last > 0.5)} of {np.isfinite(last).sum()}"
+                    late.append([*row, design.evaporation, load, *means, _cell(last), colonies])
+            elif design in (Case(), *OTHERS):
                 lines.append([*row, bridge, *map(_cell, late_shares(crossed))])
-                continue
-            for k, load in enumerate(LOADS):
-                *first, last = _shares(crossed)[WINDOWS // 2 :, k]
-                means = [number(_percent(values)[0], 0) for values in first]
-                colonies = f"{np.count_nonzero(last > 0.5)} of {np.isfinite(last).sum()}"
-                late.append([*row, load, *means, _cell(last), colonies])
+    for name, value in ((name, value) for name, values in PANELS.items() for value in values):
+        of_case = found.get(replace(Case(), **{name: value}), {})
+        if SHORT_RIGHT in of_case:
+            sides = [late_shares(of_case[side]) for side in (SHORT_RIGHT, SHORT_LEFT)]
+            varied.append([f"{name} {value}", *(_cell(one, 1) for one in np.mean(sides, axis=0))])
     means_of = _means(found)
-    shares = Table(
-        f"Share of the short branch, second half: {means_of}",
-        [*headers, "branches", *(f"{load}, %" for load in LOADS)],
-        lines,
-        text_columns=len(headers) + 1,
-    )
     edges = [w * 2 * ticks // WINDOWS for w in range(WINDOWS // 2 + 1)]
-    since = Table(
-        f"Share of a short branch that opens after {ticks} ticks, by ticks since then",
-        [*headers, "%", *(f"{a} to\n{b}" for a, b in pairwise(edges)), "colonies\nabove 50 %"],
-        late,
-        [f"{sentence(means_of)}. Colonies are counted in the last column of ticks."],
-        text_columns=len(headers) + 1,
-    )
-    return plain_text([shares, since], 120)
+    opens = f"a short branch that opens after {ticks} ticks"
+    since = f"Share of {opens} in percent, by ticks since then"
+    head, half = ("rules", "food"), "Share of the short branch in percent, second half"
+    windows = [f"{a} to\n{b}" for a, b in pairwise(edges)]
+    note = f"{sentence(means_of)}. Colonies are counted in the last column of ticks."
+    columns = (*head, "evaporation", "%", *windows, "colonies\nabove 50 %")
+    both = f"{half}, mean of both mirror images: {means_of}"
+    return {
+        "shares": Table(f"{half}: {means_of}", (*head, "branches", *LOADS), lines, (), 3),
+        "late": Table(since, columns, late, [note], 4),
+        "settings": Table(both, ("setting", *LOADS), varied),
+    }
 
 
-def _cell(values: np.ndarray) -> str:
+def _cell(values: np.ndarray, digits: int = 0) -> str:
     mean, low, high = _percent(values)
-    return number(mean, 0) + ("" if np.isnan(low) else f" {interval(low, high, 0)}")
+    return number(mean, digits) + ("" if np.isnan(low) else f" {interval(low, high, digits)}")
 
 
 def _means(found: Crossings) -> str:

@@ -27,6 +27,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     import colony_findings as study
     import numpy as np
+    import published
     from colony_figures import draw_all
     from colony_findings import JOINT, WORLD_KINDS, WORLDS, Condition
     from colony_limits import limits_of
@@ -304,6 +305,8 @@ def tables(plan: Plan, runs: Runs) -> str:
         ("differences.csv", study.difference_rows(judged)),
     ):
         files.write_csv(folder / name, table, list(table[0]))
+    for name, table in (("glance", study.glance(rows)), ("elsewhere", study.means(rows)[-1])):
+        published.write(folder / "tables" / f"colony_{name}.json", [table])
     policies = {}
     for condition, point in conditions.items():
         if condition.rules in COMPARED and condition.regime == JOINT:

@@ -23,12 +23,13 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import Any
 
     import numpy as np
+    import published
     from paper import baselines as bounds
     from paper import figures, page, process
-    from paper.claims import assess, claims_rows
+    from paper.claims import ON_PAGE, assess, claims_rows, headlines, verdict_table
     from paper.comparison import PAPER_WORLD, Comparison, Row
     from paper.page import Example, Seen
-    from paper.report import report
+    from paper.report import behaviour_table, figure_tables, report
     from paper.table2 import example_name, examples, summarise, summarise_behaviours, table2
 
     from taichi_ants import AntsError, Task, TrainingConfig, files, learners, train, worlds
@@ -253,6 +254,14 @@ def tables(plan: Plan, results: Results) -> str:
     facts = {"World": comparison.world, **setting_facts(settings_of(study.points, study.seeds))}
     links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
     facts |= made_facts(results.made)
+    titles = "return", "steps", "late_steps"
+    for name, table in {
+        **dict(zip(titles, figure_tables(lines, comparison), strict=False)),
+        "policies": behaviour_table(lines, summarise_behaviours(comparison)),
+        "claims": headlines(audit, ON_PAGE),
+        "verdicts": verdict_table(audit),
+    }.items():
+        published.write(folder / "tables" / f"paper_{name}.json", [table])
     html = page.comparison_page(comparison, baselines, lines, audit, shown, facts, links)
     files.write_text(folder / PAGE, html)
     return report(comparison, lines, audit)

@@ -1,8 +1,8 @@
 """Draw the three small pictures of the README, each for light and for dark pages.
 
 The pictures show the results in `results/compare`, which the script makes first if they are
-missing, and a table of docs/results/foraging.md. The script prints the numbers that the README
-states.
+missing, and the published table of fixed_rules.py. The script publishes how often each learner
+seems to be the best.
 """
 
 from __future__ import annotations
@@ -12,21 +12,23 @@ from taichi_ants.studies.interruption import stoppable
 with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     import csv
-    import re
     from pathlib import Path
     from typing import Any
 
     import compare
     import matplotlib
     import numpy as np
+    import published
     from matplotlib.figure import Figure
 
-    from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, WALKS
+    from taichi_ants.analysis.behaviour import CIRCLES, WALKS
+    from taichi_ants.analysis.tables import Table, percent
+    from taichi_ants.studies.command import planned, run_study
     from taichi_ants.studies.command_line import Parser, run_command
 
 ROOT = Path(__file__).parents[1]
 REPETITIONS = 10_000  # of the paper's method
-LEARNERS = "Q-learning", "SARSA", "Dyna-Q (3)", "Dyna-Q (5)"
+LEARNERS = "Q-learning", "SARSA", "Dyna-Q (p3)", "Dyna-Q (p5)"
 _STEP, _LOOP, _INK, _FAINT = "teal", "amber", "ink", "faint"
 THEMES = {  # colours of marks and text; the page shows through
     "light": {_STEP: "#1b8a92", _LOOP: "#d9480f", _INK: "#1f2328", _FAINT: "#59636e"},
@@ -66,11 +68,13 @@ def winners(results: Path) -> np.ndarray:
     return np.bincount(best.argmax(axis=1), minlength=len(LEARNERS)) / REPETITIONS
 
 
-def deliveries() -> dict[str, tuple[int, int]]:
+def deliveries() -> dict[str, tuple[int, ...]]:
     """Return deliveries in the paper's world by rules: learned, and with a policy by hand."""
-    page = (ROOT / "docs" / "results" / "foraging.md").read_text("utf-8")
-    found = re.findall(r"\| (.+): learned \| (\d+) .*\n\| fixed \| (\d+) ", page)
-    return {rules: (int(learned), int(fixed)) for rules, learned, fixed in found}
+    place, hands = "fixed_rules; the paper's world", ("learned", "by hand")
+    return {
+        rules: tuple(int(published.cell(f"{place}; {rules}; {one}")) for one in hands)
+        for rules in ("paper's rules", "A + B + C", "queues")
+    }
 
 
 def _axes(colours: dict[str, str], title: str, below: str = "") -> tuple[Figure, Any]:
@@ -109,7 +113,7 @@ def draw_winners(shares: np.ndarray, colours: dict[str, str]) -> Figure:
     return figure
 
 
-def draw_deliveries(by_rules: dict[str, tuple[int, int]], colours: dict[str, str]) -> Figure:
+def draw_deliveries(by_rules: dict[str, tuple[int, ...]], colours: dict[str, str]) -> Figure:
     """Return a picture of deliveries by rules, of learned policies and of those by hand."""
     figure, axes = _axes(colours, "Food that 64 ants deliver", "in 1000 ticks, by the rules")
     for n, (rules, pair) in enumerate(by_rules.items()):
@@ -132,14 +136,13 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 
 def make_findings(settings: argparse.Namespace) -> None:
-    """Draw all three pictures and print their numbers."""
+    """Draw all three pictures, and publish the shares of the second."""
     results = ROOT / "results" / "compare"
-    compare.main(["--out", str(results)])
+    asked = compare.parse_arguments(["--out", str(results)])
+    run_study(asked, planned(compare.__file__, asked))
     behaviours, shares, by_rules = policies(results), winners(results), deliveries()
-    counts = {one: int((behaviours == one).sum()) for one in (DELIVERS, WALKS, CIRCLES)}
-    print(f"deliver, walk, circle: {counts}")
-    print("wins:", dict(zip(LEARNERS, shares.tolist(), strict=True)))
-    print("learned, by hand:", by_rules)
+    wins = [[name, percent(share)] for name, share in zip(LEARNERS, shares, strict=True)]
+    published.show("paper_winners", [Table("", ("Learner", "best in"), wins)], True)
     with matplotlib.rc_context({"font.family": "DejaVu Sans"}):
         for theme, colours in THEMES.items():
             drawn = {

@@ -23,11 +23,14 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import TYPE_CHECKING, Any
 
     import numpy as np
+    import published
     from colony import LARGE_SIZE, task_in, world_of
     from colony_findings import ABROAD, EVALUATION_EPSILON, JOINT, WORLD_KINDS, WORLDS
+    from colony_findings import RULES as AS_NAMED
 
     from taichi_ants import AntsError, Colony, Pheromone, Task, TrainingConfig, World, files, task
     from taichi_ants.analysis.statistics import bootstrap_interval
+    from taichi_ants.analysis.tables import Table, interval
     from taichi_ants.learners.policies import FOLLOWED, RULES, trail_follower
     from taichi_ants.studies import command_line
     from taichi_ants.studies.command_line import whole_number
@@ -51,15 +54,13 @@ TASKS = {
     "paper": task.paper(),
     "foraging": task.foraging(),
     "queueing": task.queueing(),
-    "netlogo": Task(pheromone=NETLOGO),
-    "netlogo, in queues": replace(task.queueing(), pheromone=NETLOGO),
+    "NetLogo's trails": Task(pheromone=NETLOGO),
+    "NetLogo's trails, in queues": replace(task.queueing(), pheromone=NETLOGO),
 }
 TICKS, EPISODES = 1000, 4
 MEASURES = {EVALUATION_EPSILON: "deliveries", 0.0: "greedy"}  # study's, by exploration rate
-HEAD = (
-    "world    rules              epsilon  deliveries  interval      worst  first  blocked"
-    "  learned  learned - fixed"
-)
+COLUMNS = "World", "rules", "epsilon", "by hand", "worst", "first", "blocked"
+COMPARED = "learned", "learned - by hand"
 # Deliveries of each seed, by kind of world, rules, number of ants and measure.
 Learned = Mapping[tuple[str, str, int, str], Mapping[int, float]]
 
@@ -78,6 +79,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--epsilon", type=float, nargs="+", default=[0.0, 0.01], metavar="X", help=epsilons)
     study = "results folder of colony.py study to compare with"
     add("--study", type=Path, metavar="FOLDER", help=study)
+    publishes = "write the table to the docs, by this name"
+    add("--publish", metavar="NAME", help=publishes)
     command_line.add_threads(parser)
     return parser.parse_args(arguments)
 
@@ -85,7 +88,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def print_table(settings: argparse.Namespace) -> None:
     """Print the rules, and a row for each kind of world, task and epsilon."""
     learned = read_study(settings.study) if settings.study else {}
-    rows: list[str] = []
+    rows: list[list[str]] = []
     choices = list(product(settings.worlds, TASKS, settings.epsilon))
     with command_line.progress_bar("Ants with a fixed rule") as progress:
         for kind, name, epsilon in choices:
@@ -94,9 +97,16 @@ def print_table(settings: argparse.Namespace) -> None:
             places = [world.of(one) if isinstance(world, Drawn) else world for one in seeds]
             outcome = evaluate(settings, places, task_in(kind, TASKS[name]), epsilon, ants)
             taught = learned.get((kind, name, ants, MEASURES.get(epsilon, "")), {})
-            rows.append(f"{kind:8} {name:18} {epsilon:7g} {row(outcome, taught)}")
+            words = WORLDS[kind], AS_NAMED.get(name, name), f"{epsilon:g}"
+            rows.append([*words, *row(outcome, taught)])
             progress(len(rows) / len(choices))
-    print(*map(rule, FOLLOWED), HEAD, *rows, sep="\n")
+    columns = COLUMNS + COMPARED if learned else COLUMNS
+    rows = [
+        [*cells, *[""] * (len(columns) - len(cells))] for cells in rows
+    ]  # no study has NetLogo's
+    print(*map(rule, FOLLOWED), sep="\n")
+    made = Table("", columns, rows, text_columns=2)
+    published.show(settings.publish or "", [made], bool(settings.publish))
 
 
 def rule(observation: str) -> str:
@@ -121,18 +131,15 @@ def read_study(folder: Path) -> Learned:
     return learned
 
 
-def row(outcome: ColonyEpisodes, learned: Mapping[int, float]) -> str:
+def row(outcome: ColonyEpisodes, learned: Mapping[int, float]) -> list[str]:
     """Return a row of the table; `learned` has deliveries of the study's ants by seed."""
     deliveries = outcome.deliveries.mean(axis=0) * 1000 / TICKS
     # An episode without any delivery counts with all its ticks.
     first = np.where(outcome.first_delivery < 0, TICKS, outcome.first_delivery).mean()
     blocked = 100 * outcome.blocked.sum() / outcome.moves.sum()
-    text = (
-        f"{deliveries.mean():11.0f}  {interval(deliveries):12} {deliveries.min():6.0f} "
-        f"{first:6.0f} {blocked:6.0f} %"
-    )
+    cells = [shown(deliveries), f"{deliveries.min():.0f}", f"{first:.0f}", f"{blocked:.0f} %"]
     if not learned:
-        return text
+        return cells
     missing = set(range(len(deliveries))) - learned.keys()
     if missing:
         raise AntsError(
@@ -140,14 +147,13 @@ def row(outcome: ColonyEpisodes, learned: Mapping[int, float]) -> str:
             "the study with more."
         )
     taught = np.array([learned[seed] for seed in range(len(deliveries))])
-    more = taught - deliveries
-    return f"{text} {taught.mean():8.0f}  {more.mean():+.0f} [{interval(more)}]"
+    return [*cells, f"{taught.mean():.0f}", shown(taught - deliveries)]
 
 
-def interval(values: np.ndarray) -> str:
-    """Return the 95 % interval of a mean over seeds as text."""
+def shown(values: np.ndarray) -> str:
+    """Return a mean over seeds with its 95 % interval as text."""
     (low,), (high,) = bootstrap_interval(values[None])
-    return f"{low:.0f} to {high:.0f}"
+    return f"{values.mean():.0f} {interval(low, high, 0)}"
 
 
 def evaluate(

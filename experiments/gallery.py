@@ -1,10 +1,10 @@
-"""Draw all pictures of the README and the docs, in `renders/` and `docs/figures/`.
+"""Draw all pictures of the README and the docs, and publish the tables of the studies.
 
 The scripts `render.py`, `learning.py` and `policy_sheet.py` draw the pictures in `renders/`. The
-pictures in `docs/figures/` show the results in `results/compare`, `results/colony` and
-`results/bridge`. If results are missing, the script runs the study first. The comparison takes
-less than a minute on two cores; see docs/results/foraging.md and docs/results/bridge.md for the
-other two.
+pictures in `docs/figures/`, and the tables of their pages, are those of `results/compare`,
+`results/colony` and `results/bridge`. If results are missing, the script runs the study first. The
+comparison takes less than a minute on two cores; see docs/results/foraging.md and
+docs/results/bridge.md for the other two.
 """
 
 from __future__ import annotations
@@ -201,13 +201,14 @@ def _keep(picture: bytes, path: Path) -> None:
 
 
 def make_figures(folder: Path) -> None:
-    """Copy figures of the studies, after running missing studies.
+    """Copy figures and tables of the studies, after running missing studies.
 
     They have 256 colours, so that their history in Git stays small.
     """
     import bridge
     import colony
     import compare
+    import published
     from PIL import Image
 
     from taichi_ants.studies.command import planned, run_study
@@ -216,6 +217,9 @@ def make_figures(folder: Path) -> None:
     for script, words in ((compare, ()), (colony, ("study",)), (bridge, ())):
         settings = script.parse_arguments([*words, "--out", str(results / script.__name__)])
         run_study(settings, planned(script.__file__, settings))
+        for table in (settings.out / "tables").glob("*.json"):
+            shutil.copy(table, published.data_file(table.stem))
+    published.fill()
     folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
         with Image.open(results / source) as image:

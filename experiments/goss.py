@@ -2,7 +2,7 @@
 
 For each ratio r of the branch lengths, the script prints the share of colonies in each class of the
 share of ants on the short branch. It also prints the published shares and the standard error. In
-the last rows, the short branch opens late. See docs/models/index.md.
+the last rows, the short branch opens late. See docs/models/goss.md.
 """
 
 # No `from __future__ import annotations`, because Taichi reads the annotations of kernels.
@@ -13,9 +13,11 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import Annotated
 
     import numpy as np
+    import published
     import taichi as ti
 
     from taichi_ants import runtime
+    from taichi_ants.analysis.tables import Table
     from taichi_ants.arithmetic.numbers import power
     from taichi_ants.arithmetic.random_bits import advance, bits_of, high_word, low_word
     from taichi_ants.errors import AntsError, checked_whole, count
@@ -153,6 +155,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     number = whole_number(4, 10_000_000)
     add("--choices", type=number, default=AS_PUBLISHED, metavar="N", help=chosen)
     add("--seed", type=whole_number(), default=0, metavar="N", help="seed of all colonies")
+    add("--publish", action="store_true", help="write the table to the docs")
     add_threads(parser)
     return parser.parse_args(arguments)
 
@@ -169,27 +172,25 @@ def print_table(settings: argparse.Namespace) -> None:
             f"--choices {n} with --colonies {colonies} needs {2 * n * colonies / 1e9:.0f} GB; "
             f"their product must be at most {MOST_CHOICES // 2}, so reduce either of them."
         )
-    rows = [(str(r), r, 0, published) for r, published in PUBLISHED.items()]
-    rows += [(f"{LATE_RATIO}, opens late", LATE_RATIO, n, PUBLISHED_LATE)]
-    print(
-        f"Percentage of colonies by the share of ants {n // 2 + 1} to {n} on the short branch.\n"
-        f"If that branch opens after ant {n}: ants {n + n // 2 + 1} to {2 * n}.\n"
-    )
-    classes = (f"{low}-{low + 20} %" for low in range(0, 100, 20))
-    print(f"  {'r':25}" + "".join(f"{one:>9}" for one in classes))
-    for name, ratio, opens, published in rows:
+    cases = [(str(r), r, 0, theirs) for r, theirs in PUBLISHED.items()]
+    cases += [(f"{LATE_RATIO}, opens late", LATE_RATIO, n, PUBLISHED_LATE)]
+    rows: list[list[str]] = []
+    for name, ratio, opens, theirs in cases:
         how = {"ants": opens + n, "opens": opens, "seed": settings.seed}
         took = choices(*crossing_steps(ratio), colonies, **how, threads=settings.threads)
         shown = {"ours": class_shares(took, opens + n // 2 + 1, opens + n)}
         if n == AS_PUBLISHED:
-            shown["published"] = published
-        for kind, row in shown.items():
-            print(f"  {name:15} {kind:9}" + "".join(f"{percent:9.1f}" for percent in row))
+            shown["published"] = theirs
+        rows += [[name, kind, *(f"{share:.1f}" for share in row)] for kind, row in shown.items()]
     # A share p of N colonies has the standard error sqrt(p (1 - p) / N), the largest with p = 1/2.
-    print(
-        f"\nOur shares are of {count(colonies, 'colony')} for each r, with a standard error of at "
-        f"most {50 / colonies**0.5:.1f} percentage points."
+    notes = (
+        f"Percentage of colonies by the share of ants {n // 2 + 1} to {n} on the short branch; if "
+        f"it opens after ant {n}, of ants {n + n // 2 + 1} to {2 * n}. Ours: "
+        f"{count(colonies, 'colony')} for each r, with a standard error of at most "
+        f"{50 / colonies**0.5:.1f} percentage points.",
     )
+    columns = ("r", "", *(f"{low}-{low + 20} %" for low in range(0, 100, 20)))
+    published.show("goss", [Table("", columns, rows, notes, 2)], settings.publish)
 
 
 if __name__ == "__main__":

@@ -20,10 +20,11 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from pathlib import Path
 
     import numpy as np
+    import published
 
     from taichi_ants import Colony, TrainingConfig, evaluate, load_policy, offline, train, worlds
     from taichi_ants.analysis.statistics import bootstrap_interval
-    from taichi_ants.analysis.tables import Table, interval, number, plain_text
+    from taichi_ants.analysis.tables import Table, interval, number
     from taichi_ants.learners.policies import random_policy, trail_follower
     from taichi_ants.offline import Dataset, record, record_colony
     from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
@@ -59,6 +60,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = Parser(__doc__)
     seeds = "number of seeds, starting at 0"
     parser.add_argument("--seeds", type=whole_number(2), default=10, metavar="N", help=seeds)
+    publishes = "write the tables to the docs"
+    parser.add_argument("--publish", action="store_true", help=publishes)
     return parser.parse_args(arguments)
 
 
@@ -68,7 +71,7 @@ def print_tables(settings: argparse.Namespace) -> None:
     for title, table_of in (("data", learning), ("evaluation", judging), ("colonies", dying)):
         with progress_bar(title) as progress:
             table = table_of(seeds, progress)
-        print(plain_text([table], 120), flush=True)
+        published.show(f"offline_{title}", [table], settings.publish)
 
 
 def shown(values: np.ndarray, digits: int = 2) -> str:

@@ -5,7 +5,7 @@ with their 95 % interval over seeds, and the tick of the first delivery. The oth
 the path of a colony, a walk from the nest to food and back that always follows the highest utility.
 They are the number of colonies that ever had a shortest path, and the median of the ticks when they
 first had it. The last two columns are the mean length of paths at the end, as a multiple of the
-shortest, and the number of colonies with a path. See docs/models/index.md.
+shortest, and the number of colonies with a path. See docs/models/utility.md.
 """
 
 # No `from __future__ import annotations`, because Taichi reads the annotations of kernels.
@@ -19,12 +19,14 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import Annotated
 
     import numpy as np
+    import published
     import taichi as ti
     from ant_system import first_true, open_cells
     from taichi.math import popcnt
 
     from taichi_ants import World, runtime, worlds
     from taichi_ants.analysis.statistics import bootstrap_interval
+    from taichi_ants.analysis.tables import Table, interval
     from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word, low_word
     from taichi_ants.grid.constants import N_HEADINGS, STREAM_FORAGER
     from taichi_ants.grid.randomness import stream_state
@@ -42,7 +44,7 @@ WORLDS = {
 }
 EPISODES = 4  # of each seed, as in fixed_rules.py
 EVERY = 10  # ticks between measurements of the path
-HEAD = "world   room  deliveries  interval      first  found by  tick  length  at the end"
+COLUMNS = "World", "room", "deliveries", "first", "found by", "tick", "length", "at the end"
 
 NEST, PILE = 0, 1  # goals; an ant comes from one and looks for the other
 CELL, HEADING, ORIGIN = 0, 1, 2  # columns of `ants`
@@ -213,7 +215,7 @@ def forage(
         U_p(s) <- max(U_p(s), R_p(s) + discount * max over the neighbours s' of U_p(s')),
 
     where the reward R_p is 1 in a cell of goal p, else 0. Then it moves to the neighbour with the
-    highest utility of the other goal. `docs/models/index.md` lists sources and deviations.
+    highest utility of the other goal. `docs/models/utility.md` lists sources and deviations.
 
     All `ants` of a colony start in the nest, which has room for all; a cell has room for
     `capacity`. `evaporation` is the share of utilities that evaporates per tick. `exploration` is
@@ -266,6 +268,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     }
     for flag, (default, words) in shares.items():
         add(flag, type=float, default=default, metavar="X", help=words)
+    add("--publish", action="store_true", help="write the table to the docs")
     command_line.add_threads(parser)
     return parser.parse_args(arguments)
 
@@ -273,13 +276,13 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def print_table(settings: argparse.Namespace) -> None:
     """Print a row for each kind of world and each --room, after building all worlds."""
     maps = {kind: [build(n) for n in range(settings.seeds)] for kind, build in WORLDS.items()}
-    rows: list[str] = []
+    rows: list[list[str]] = []
     with command_line.progress_bar("Ants that back up utilities") as progress:
         for kind, room in product(WORLDS, settings.room):
             outcomes = [run(settings, world, n, room) for n, world in enumerate(maps[kind])]
-            rows.append(f"{kind:6} {room:5} {row(outcomes)}")
+            rows.append([kind, f"{room}", *row(outcomes)])
             progress(len(rows) / (len(WORLDS) * len(settings.room)))
-    print(HEAD, *rows, sep="\n")
+    published.show("utility", [Table("", COLUMNS, rows)], settings.publish)
 
 
 def run(settings: argparse.Namespace, world: World, seed: int, room: int) -> Foraging:
@@ -289,7 +292,7 @@ def run(settings: argparse.Namespace, world: World, seed: int, room: int) -> For
     return forage(world, colonies=EPISODES, capacity=room, seed=seed, **chosen)
 
 
-def row(outcomes: list[Foraging]) -> str:
+def row(outcomes: list[Foraging]) -> list[str]:
     """Return the row of a kind of world."""
     deliveries = 1000 * np.array([one.deliveries.mean() for one in outcomes])
     (low,), (high,) = bootstrap_interval(deliveries[None])
@@ -301,10 +304,9 @@ def row(outcomes: list[Foraging]) -> str:
     ends = np.concatenate([one.lengths[:, -1:].ravel() / one.shortest for one in outcomes])
     has = ends > 0
     length = f"{ends[has].mean():.2f}" if has.any() else "-"
-    return (
-        f"{deliveries.mean():11.0f}  {f'{low:.0f} to {high:.0f}':12} {first:6.0f} "
-        f"{(found > 0).sum():5}/{len(found):<3} {when:>5} {length:>7} {has.sum():8}"
-    )
+    mean = f"{deliveries.mean():.0f} {interval(low, high, 0)}"
+    share = f"{(found > 0).sum()}/{len(found)}"
+    return [mean, f"{first:.0f}", share, when, length, f"{has.sum()}"]
 
 
 if __name__ == "__main__":

@@ -67,7 +67,7 @@ PAGES = {
         (
             *(f"page/{name}.js" for name in (*_SHARED, "mind", "scenes")),
             *(f"article/{name}.js" for name in ("pieces", "world")),
-            *("lessons/random.js", "../docs/lessons/page/room.js"),
+            *("../docs/lessons/page/random.js", "../docs/lessons/page/room.js"),
             *("../docs/lessons/page/experiments.js", "lessons/lessons.js"),
         ),
         {**_COLONY, "ANT_WASM": "ant.wasm"},
@@ -77,7 +77,8 @@ PAGES = {
 FONTS = LAB / "page" / "fonts"
 FACES = (("Newsreader", "500", "newsreader.woff2"), ("Inter", "400 650", "inter.woff2"))
 _IMPORT = re.compile(r"^import\b[^;]*;\n", re.M)
-_NAME = re.compile(r"^(?:async )?(?:const|let|function|class) (\w+)", re.M)
+# Names at the start of a line, also several in a row: const A = 1, B = 2;
+_NAMES = re.compile(r"^(?:async )?(?:const|let|function|class) ((?:\w+ = [^,(\[{\n]+, )*\w+)", re.M)
 
 
 def base64_of(path: Path) -> str:
@@ -89,7 +90,7 @@ def script(modules: tuple[str, ...]) -> str:
     """Return the modules as one script; raise ValueError if two of them declare the same name."""
     parts = [_IMPORT.sub("", (LAB / name).read_text("utf-8")) for name in modules]
     text = re.sub(r"^export ", "", "\n".join(parts), flags=re.M)
-    names = _NAME.findall(text)
+    names = [re.sub(" = .*", "", one) for row in _NAMES.findall(text) for one in row.split(", ")]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ValueError(f"two modules declare {twice[0]}; rename it in one of them")

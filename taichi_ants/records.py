@@ -66,7 +66,7 @@ class Snapshot(Record):
         food_kinds: uint8 (grid.size,), the kind of the food in each cell; 0 without food.
         queens: int32 (nests,), the flat cell index of the queen of each nest.
         of_ants: The arrays (n,) of the features of the model by their views, which are attributes,
-            too, with "ant_" in front.
+            too, after `ant_`.
         fields: The levels of each pheromone by name, (grid.size,); "trail" is `trail`.
         counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers. Also
             `nest_deliveries`, `food_deliveries` and `caste_deliveries`, int32 (nests or kinds of

@@ -261,7 +261,7 @@ class _Signature:
     def __get__(self, _: object, cls: Any) -> Signature:
         if not _is_ready(cls):
             raise AttributeError("__signature__")
-        hints = get_type_hints(cls.__init__)
+        hints = get_type_hints(cls)
         _, *arguments = signature(cls.__init__).parameters.values()
         return Signature(
             [one.replace(annotation=hints.get(one.name, one.annotation)) for one in arguments]

@@ -8,7 +8,7 @@ both models. On the late bridge, rock closes the short branch for the first half
 are of the crossings in the last tenth of the time.
 
 The table has, for each bridge, the share of colonies with most crossings on the short branch, and
-the share of colonies with at least 80 % of them on one branch. See docs/models.md.
+the share of colonies with at least 80 % of them on one branch. See docs/models/double_bridge.md.
 """
 
 import sys

@@ -2,7 +2,7 @@
 
 Ants lay the field "home" while they are without food. It is strongest near the nest, because
 deposits fade with the time since an ant left it. Ants with food follow it in place of the compass.
-See docs/models.md.
+See docs/models/home_trail.md.
 """
 
 import model_script

@@ -2,7 +2,7 @@
 
 For each rate, ants learn to forage together, once with trails and once without, each in the world
 of its seed. Then they follow what they learned. The table has deliveries per 1000 ticks with and
-without trails, and the difference, paired by seed. See docs/models.md.
+without trails, and the difference, paired by seed. See docs/models/misreading.md.
 """
 
 from dataclasses import replace

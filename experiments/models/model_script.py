@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,8 +12,11 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants.analysis import style
 from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.analysis.tables import Table, plain_text
+from taichi_ants.analysis.tables import Table
 from taichi_ants.studies.command_line import Parser, run_command, whole_number
+
+sys.path.append(str(Path(__file__).parents[1]))
+import published
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +43,7 @@ class ScriptResults(NamedTuple):
 def run(
     script: str, doc: str | None, measure: Callable[[list[int]], Sequence[Any]], seeds: int = 20
 ) -> None:
-    """Run a script, the path of a file, with the options --seeds and --out.
+    """Run a script, the path of a file, with the options --seeds, --out and --publish.
 
     It writes NAME.csv and NAME.png, where NAME is that of the script, and prints a table of means
     over seeds with 95 % intervals. `measure` returns `ScriptResults` of a list of seeds.
@@ -47,36 +51,45 @@ def run(
     name, parser = Path(script).stem, Parser(doc)
     parser.add_argument("--seeds", type=whole_number(1), default=seeds, help="number of seeds")
     parser.add_argument("--out", type=Path, default=Path("results") / name, help="output folder")
+    add = "write table and figure to the docs"
+    parser.add_argument("--publish", action="store_true", help=add)
     options = parser.parse_args()
 
     def main() -> None:
         folder = files.check_writable_file(options.out / f"{name}.csv").parent
         found = ScriptResults(*measure(list(range(options.seeds))))
         files.write_csv(folder / f"{name}.csv", found.numbers, list(found.numbers[0]))
-        print(table(found.summary))
         with style.styled():
             figure = style.new_figure(found.height)
             axes = figure.subplots(*found.panels, sharex=True, sharey=True)
             found.draw(axes)
             style.frame(figure, found.title, found.caption, style.legend_entries(np.ravel(axes)))
-        style.save(figure, folder / f"{name}.png")
-        print(f"Numbers: {folder / name}.csv. Figure: {folder / name}.png.")
+        picture = folder / f"{name}.png"
+        style.save(figure, picture)
+        published.show(name, [table(found.summary)], options.publish, picture)
+        print(f"Numbers: {folder / name}.csv. Figure: {picture}.")
 
     run_command(main)
 
 
-def table(rows: Rows) -> str:
+def table(rows: Rows) -> Table:
     """Return means with 95 % bootstrap intervals, a line for each value of the first column."""
     by, *names = rows[0]
     lines = []
     for condition in dict.fromkeys(row[by] for row in rows):
         values = np.array([[row[n] for n in names] for row in rows if row[by] == condition], float)
-        means = [f"{mean:.4g}" for mean in values.mean(axis=0)]
+        means = [_shown(mean) for mean in values.mean(axis=0)]
         if len(values) > 1:
             ends = zip(*bootstrap_interval(values.T), strict=True)
-            means = [f"{m} [{a:.4g}, {b:.4g}]" for m, (a, b) in zip(means, ends, strict=True)]
+            means = [
+                f"{m} [{_shown(a)}, {_shown(b)}]" for m, (a, b) in zip(means, ends, strict=True)
+            ]
         lines.append([str(condition), *means])
-    return plain_text([Table("", [by, *names], lines, text_columns=len(names) + 1)], width=120)
+    return Table("", [by, *names], lines)
+
+
+def _shown(value: float) -> str:
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def band(axes: Axes, x: Sequence[float], values: np.ndarray, label: str, marker: str = "") -> None:

@@ -4,7 +4,7 @@ Corridors fork twice, and food grows back at the end of one of four branches. Al
 attractive path wherever they go, and choose the next cell by it, without learning. Pharaoh's ants
 also mark unrewarding branches with a repellent (Robinson et al. 2005). Here, ants mark wherever
 they go after a search in vain, or only where they see three obstacles. In a control, the repellent
-lies on the three branches without food from the start. See docs/models.md.
+lies on the three branches without food from the start. See docs/models/no_entry.md.
 """
 
 from typing import Annotated
@@ -154,7 +154,8 @@ def measure(seeds: list[int]) -> model_script.ScriptResults:
                 one = {"half_life": half_life, "model": name, "seed": seed}
                 for step, n in enumerate(of_seed, start=1):
                     numbers.append({**one, "tick": step * STEP, "delivered": n})
-                row = {"half-life, model": f"{half_life:g} {name}", "deliveries": of_seed[-1]}
+                case = f"{name}, {half_life:g} ticks"
+                row = {"repellent, half-life of the path": case, "deliveries": of_seed[-1]}
                 summary.append({**row, "difference": of_seed[-1] - base})
 
     def draw(axes):

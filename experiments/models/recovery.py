@@ -1,8 +1,8 @@
 """Measure how a colony recovers after a share of its ants is removed.
 
-Ants follow a hand-written rule. The queen turns food into ants, which live for 1000 ticks. After
-2000 ticks, a share of the ants is removed. The colony has recovered when it has at least 95 % of
-the ants of the same colony without the removal. See docs/how-to/measures.md.
+Ants follow the hand-written policy. The queen turns food into ants, which live for 1000 ticks.
+After 2000 ticks, a share of the ants is removed. The colony has recovered when it has at least 95 %
+of the ants of the same colony without the removal. See docs/models/recovery.md.
 """
 
 import model_script

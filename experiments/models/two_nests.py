@@ -1,8 +1,8 @@
 """Measure how two nests share one pile of food.
 
-The pile lies between two queens, and its cells hold 20 loads each. All ants follow a hand-written
-rule, and the ants of both nests follow and change the same trails. Both nests have as many ants. A
-nest's share is its part of all loads delivered in 500 ticks. See docs/models.md.
+The pile lies between two queens, and its cells hold 20 loads each. All ants follow the hand-written
+policy, and the ants of both nests follow and change the same trails. Both nests have as many ants.
+A nest's share is its part of all loads delivered in 500 ticks. See docs/models/two_nests.md.
 """
 
 import model_script

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,6 +87,10 @@ def _claims() -> tuple[Claim, ...]:
 CLAIMS = _claims()
 # The main claims. Two of them are about steps, because they disagree.
 HEADLINES = ("q-return-highest", "overall-sarsa-length", "sarsa-much-shorter")
+ON_PAGE = (  # of the docs
+    *(*HEADLINES, "sarsa-shortest-episode", "dyna-between-length", "rate-strongest", "discount-q"),
+    *("dyna-depth-length-best", "dyna-depth-length", "greedy-success"),
+)
 
 Audit = dict[Claim, dict[str, Finding]]  # by claim and delivery setting
 
@@ -151,12 +156,20 @@ def tallies(audit: Audit) -> list[str]:
     ]
 
 
-def headlines(audit: Audit) -> Table:
-    """Return a table of the findings on the main claims, a column for each delivery setting."""
+def verdict_table(audit: Audit) -> Table:
+    """Return a table of the number of claims by verdict, a column for each delivery setting."""
+    settings = list(next(iter(audit.values())))
+    counts = [Counter(by[one].verdict.value for by in audit.values()) for one in settings]
+    rows = [[word, *(f"{by[word]}" for by in counts)] for word in counts[0]]
+    return Table("", ("Verdict", *settings), rows)
+
+
+def headlines(audit: Audit, names: Sequence[str] = HEADLINES) -> Table:
+    """Return a table of the findings on some claims, a column for each delivery setting."""
     claims = {claim.id: claim for claim in audit}
     rows = [
         [f"{claim.statement}\n({claim.quantity.words})", *map(_cell, audit[claim].values())]
-        for claim in (claims[name] for name in HEADLINES)
+        for claim in (claims[name] for name in names)
     ]
     note = (
         "Below the verdict: the difference that decides, its interquartile mean (IQM) over seeds "

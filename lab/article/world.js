@@ -42,7 +42,7 @@ class World {
     const { ask, options, unit } = this.piece, { id } = this;
     const rows = options.map(([, name], k) => `<label class="option"><input type="radio" name="${id}" value="${k}"${k === this.option ? " checked" : ""}>`
       + `<span class="name">${name}</span><output>–</output><span class="bar"><i></i><b></b></span></label>`);
-    return `<div class="view"><canvas role="img"></canvas><div class="buttons"><button class="play"></button>`
+    return `<div class="view"><canvas role="img" aria-label="A world of ants: ${ask}"></canvas><div class="buttons"><button class="play"></button>`
       + `<button class="again" aria-label="Start again" title="Start again">${icon("again")}</button></div></div>`
       + `<div class="side"><fieldset class="options"><legend>${ask}</legend>${rows.join("")}</fieldset><p class="unit">${unit}</p>`
       + `<button class="seeds">Was it luck? Run ${SEEDS} seeds</button><a class="open" href="lab.html">Open in the lab</a></div>`;

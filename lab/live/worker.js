@@ -2,12 +2,13 @@
  * taichi_ants/live/server.py does, with the same frames; of the edits, it knows those of EDITS. */
 
 import { CAPACITY, EMPTY, Engine, FOOD, hexDistance, LEARNERS, ROCK } from "../page/engine.js";
-import { decode } from "../page/link.js";
+import { decode, partsOf } from "../page/link.js";
 import { SCENE } from "../page/worlds.js";
 
 const FRAMES_A_SECOND = 30, FASTEST = 1000; // as in server.py
 const MOST_IN_FLIGHT = 12, STATE_MS = 500;
 const BUSY_MS = 25, TICKS_AT_ONCE = 8;      // of a frame at the fastest speed
+const MOST_TICKS = 200_000, MOST_LOOKED_BACK = 2_000_000; // of a visit; these times its ants
 const LEARNER_LABELS = ["Q-learning", "SARSA"];
 
 /** What an edit does to an engine; `value` are its settings. */
@@ -45,15 +46,23 @@ export class LiveColony {
    * @param {(message: string | ArrayBuffer) => void} post
    */
   constructor(module, headers, link, post) {
-    const [code, tick] = link.split(";");
-    const { scene, events } = code ? decode(code) : { scene: SCENE, events: [] };
-    Object.assign(this, { module, headers, scene, post, playing: false, speed: 12, sessions: 0, inFlight: 0, behind: false });
-    this.start(events);
+    Object.assign(this, { module, headers, post, speed: 12, sessions: 0 });
+    let visit = { scene: SCENE, events: [], tick: 0 }, damage = "";
+    try {
+      const parts = partsOf(link);
+      if (link) visit = { ...decode(parts.code), tick: parts.tick };
+    } catch {
+      damage = "this link is damaged; here is the first screen of the lab.";
+    }
+    const { scene, events, tick } = visit, end = Math.min(tick ?? 0, MOST_TICKS);
+    this.scene = scene;
+    this.start(events, [], Math.max(0, end - Math.floor(MOST_LOOKED_BACK / scene.ants)));
     this.sendBegin();
-    while (this.engine.tick < (Number(tick) || 0)) { // the page can look back at all of it
+    while (this.engine.tick < end) { // the page can look back at each tick
       this.advance(1);
       this.inFlight = 1;
     }
+    if (damage) this.say("error", { words: damage });
     this.sendState();
   }
 

@@ -38,6 +38,7 @@ export class Address {
     this.lab = lab;
     byId("copy").addEventListener("click", () => this.copy());
     byId("verify").addEventListener("click", () => this.verify());
+    byId("back").addEventListener("click", ({ target }) => { target.href = `live.html#${linkOf(this.lab.runs[this.lab.runs.length - 1].engine)}`; });
     addEventListener("hashchange", () => this.open());
   }
 

@@ -299,10 +299,10 @@ export const GRID = [["q_learning", 0], ["sarsa", 0], ["dyna_q", 3], ["dyna_q", 
     [0.3, 0.5].flatMap((epsilon) => [0.99, 0.995].map((decay) =>
       ({ learner, planningSteps, truncates, rate, discount, epsilon, decay })))))));
 
-// What is noted of a step. Cell and heading are those after it, and the value is that of the entry which the step has changed.
-const NOTES = ["episode", "step", "state", "action", "reward", "next", "terminated", "cell", "heading", "value"];
+export class LoneAnts { // complete in itself, because workers get its text
+  /** What is noted of a step. Cell and heading are those after it, and the value is that of the entry which the step has changed. */
+  static NOTES = ["episode", "step", "state", "action", "reward", "next", "terminated", "cell", "heading", "value"];
 
-export class LoneAnts {
   /** @param {WebAssembly.Module} module ant.wasm */
   constructor(module) { this.wasm = /** @type {any} */ (new WebAssembly.Instance(module, {}).exports); }
 
@@ -321,9 +321,9 @@ export class LoneAnts {
     const memory = this.wasm.memory.buffer; // it may have grown
     this.values = new Float32Array(memory, done, n * 640).slice();
     const [returns, steps, deliveries] = [0, 1, 2].map((k) => new Int32Array(memory, done + 4 * (n * 640 + k * all), all).slice());
-    const whole = new Int32Array(memory, noted, NOTES.length * this.wasm.steps_noted()), exact = new Float32Array(memory, noted, whole.length);
-    this.notes = Array.from({ length: this.wasm.steps_noted() }, (_, k) => Object.fromEntries(NOTES.map((name, j) =>
-      [name, (name === "value" ? exact : whole)[k * NOTES.length + j]])));
+    const whole = new Int32Array(memory, noted, LoneAnts.NOTES.length * this.wasm.steps_noted()), exact = new Float32Array(memory, noted, whole.length);
+    this.notes = Array.from({ length: this.wasm.steps_noted() }, (_, k) => Object.fromEntries(LoneAnts.NOTES.map((name, j) =>
+      [name, (name === "value" ? exact : whole)[k * LoneAnts.NOTES.length + j]])));
     return { returns, steps, deliveries };
   }
 

@@ -259,8 +259,9 @@ class Lab {
     ui.hero = told.id === "food" ? run.facts.firstAnt : -1; // who found food first is marked until it is home
     if (told.ghost && !ui.down && !this.film.copy) ui.ghost ||= run.suggestion();
     else ui.ghost = null;
-    byId("rate").textContent = many(run.perMinute);
-    if (runs.length > 1) byId("rate-left").textContent = many(runs[0].perMinute);
+    const rateOf = (one) => (this.question?.said < 0 ? "?" : many(one.perMinute)); // it would give the answer away
+    byId("rate").textContent = rateOf(run);
+    byId("rate-left").textContent = rateOf(runs[0]);
     byId("undo").disabled = !runs.some(hasStroke);
     byId("tick").textContent = many(run.tick);
     byId("hash").textContent = run.engine.hash();

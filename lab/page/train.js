@@ -10,7 +10,7 @@ const NAMES = { q_learning: "Q-learning", sarsa: "SARSA", dyna_q: "Dyna-Q" };
 const nameOf = ({ learner, planningSteps }) => NAMES[learner] + (planningSteps ? `, ${planningSteps} planning steps` : "");
 const CHOICES = [["learner", "Learner"], ["truncates", "A delivery"], ["rate", "Learning rate"], ["discount", "Discount"],
                  ["epsilon", "Exploration"], ["decay", "Its decay"]];
-const WORDS = { learner: nameOf, truncates: ({ truncates }) => (truncates ? "ends the episode" : "goes on") };
+const WORDS = { learner: nameOf, truncates: ({ truncates }) => (truncates ? "truncates" : "terminates") };
 const wordingOf = (name, setting) => (WORDS[name] ? WORDS[name](setting) : String(setting[name]));
 
 /* What a worker runs: the engine's class as text, so that the page needs no other file. */
@@ -65,7 +65,7 @@ export class Training {
       return `<label><span>${label}</span><select id="t-${name}">${words.map((word) => `<option>${word}</option>`).join("")}</select></label>`;
     };
     this.dialog.innerHTML = `<button class="close" aria-label="Close">×</button><h2>One ant, alone</h2>
-      <p>The paper trains single ants: ${EPISODES} episodes in a small world, from nothing. Choose a setting, and train ${SEEDS} ants with it; they differ only in their seed.</p>
+      <p>The paper trains single ants: ${EPISODES} episodes in a small world, from nothing. Choose a setting, and train ${SEEDS} ants with it; they differ only in their seed. A delivery ends the episode: if it terminates, nothing is worth more after it; if it truncates, ants learn as if it went on.</p>
       <div class="choices">${CHOICES.map(options).join("")}</div>
       <p class="acts"><button id="t-one">Train ${SEEDS} ants</button><button id="t-grid">Train the whole grid: ${many(GRID.length * SEEDS)} ants</button></p>
       <progress id="t-bar" max="1" value="0" hidden aria-label="Trained so far"></progress>
@@ -209,6 +209,6 @@ export class Training {
     x.fillStyle = colours.soft;
     x.fillText(low.toFixed(0), 6, h - 5);
     x.textAlign = "right";
-    x.fillText(`${high.toFixed(0)} return of an episode (IQM); upper row: a delivery ends it`, w - 4, h - 5);
+    x.fillText(`${high.toFixed(0)} return of an episode (IQM); upper row: deliveries truncate`, w - 4, h - 5);
   }
 }

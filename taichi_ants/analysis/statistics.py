@@ -1,4 +1,4 @@
-"""Estimates over seeds and their intervals; docs/concepts/statistics.md has their uses and coverage.
+"""Estimates over seeds and their intervals; see docs/concepts/statistics.md for their coverage.
 
 There are two estimators: the mean, and the interquartile mean (IQM), which is the mean of the
 middle half of the runs (Agarwal et al. 2021). Each has two intervals:

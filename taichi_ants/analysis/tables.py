@@ -74,11 +74,11 @@ class Table:
     text_columns: int = 1
 
     def markdown(self) -> str:
-        """Return title, table and notes as Markdown, each cell on one line."""
+        """Return title, table and notes as Markdown, a row of the table on each line."""
         left = self.text_columns
         rule = [*["---"] * left, *["---:"] * (len(self.columns) - left)]
         lines = [
-            f"| {' | '.join(' '.join(cell.split()) for cell in cells)} |"
+            f"| {' | '.join('<br>'.join(cell.splitlines()) for cell in cells)} |"
             for cells in (self.columns, rule, *self.rows)
         ]
         parts = [f"**{self.title}**\n"] if self.title else []

@@ -34,13 +34,13 @@ class HexColonyParallelEnv(ParallelEnv):
     `max_steps` steps, all ants are truncated. A delivery does not end the episode, for any
     `delivery` of the task: the ant continues, and `info["event"]` is DELIVERED.
 
-    ## Arguments
-    - `ants`: The number of ants at the start.
-    - `start`: "nest" for cells near the queen, or "spread" for any cells.
-    - `capacity`: The largest number of living ants; by default, `ants`, or 2 * `ants` + 64 if the
-      task has births.
-    - `max_steps`: The number of steps of an episode.
-    - All others: See `HexForageEnv`.
+    Args:
+        ants: The number of ants at the start.
+        start: "nest" for cells near the queen, or "spread" for any cells.
+        capacity: The largest number of living ants; by default, `ants`, or 2 * `ants` + 64 if the
+            task has births.
+        max_steps: The number of steps of an episode.
+        others: See `HexForageEnv`.
 
     Attributes:
         possible_agents: All agents that can live in an episode: the ants at the start and those

@@ -23,11 +23,11 @@ _CELLS = Setting(only=("rule", *WITHOUT_VALUES))
 
 @dataclass(frozen=True)
 class Choice(Settings, path="task.choice"):
-    """The rule by which ants choose actions; `sentences` describe the built-in ones.
+    """The rule by which ants choose actions.
 
     Only colonies support "deneubourg", which needs no action values, and the names of your rules,
     see `taichi_ants.rules`. "deneubourg" compares levels of the outbound cue; for ants with food,
-    those of `carriers_follow` or a homing pheromone. See `docs/concepts/world_and_ants.md`.
+    those of `carriers_follow` or a homing pheromone.
     """
 
     sentences: ClassVar[dict[str, str]] = {

@@ -47,9 +47,8 @@ OCCASIONS: dict[str, Occasion] = {
 class Field(Pheromone, path="task.fields.NAME"):
     """The rules of a further pheromone, which has a level in each cell, 0 at the start.
 
-    All settings of `Pheromone` apply, and `sentences` describe when ants deposit. `view` has an
-    effect only if the field is a cue. Deposits that fade count ticks since the ant's last pick-up,
-    delivery or birth, or since the start of the episode.
+    All settings of `Pheromone` apply; `view` has an effect only if the field is a cue. Deposits
+    that fade count ticks since the ant's last pick-up, delivery or birth, or since the start.
     """
 
     sentences: ClassVar[dict[str, str]] = {

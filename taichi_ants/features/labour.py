@@ -42,10 +42,7 @@ _NONE, _FIXED, _UNIFORM, _NORMAL, _LOGNORMAL = range(len(DISTRIBUTIONS))
 
 @dataclass(frozen=True)
 class Labour(Settings, path="task.labour"):
-    """The rule by which ants start and stop foraging; by default, they always forage.
-
-    `sentences` describe the rule "thresholds". See `docs/concepts/world_and_ants.md`.
-    """
+    """The rule by which ants start and stop foraging; by default, they always forage."""
 
     sentences: ClassVar[dict[str, str]] = {
         "rule=thresholds": "Each nest has a stimulus s, which is 0 at the start of an episode, "

@@ -25,7 +25,7 @@ Level = Annotated[
 
 @dataclass(frozen=True)
 class Pheromone(Settings, path="task.pheromone"):
-    """The rules by which trails are laid, evaporate and spread; `sentences` describe the values.
+    """The rules by which trails are laid, evaporate and spread.
 
     Other names of `evaporation` and `deposit` are those of your rules, see `taichi_ants.rules`.
     Trails that fade rise towards food if `slope` exceeds the evaporation.

@@ -33,9 +33,8 @@ Delivery = Literal["terminates", "truncates"]
 class Traffic(Settings, path="task.traffic"):
     """Rules for entering a cell with an ant on it; by default, as in the paper, no ant may.
 
-    `sentences` describe the settings. A pushed ant gets the reward of a move onto an empty cell.
-    With `follow`, all ants of a queue move at once, but a ring of ants does not move. See
-    `docs/concepts/world_and_ants.md`.
+    A pushed ant gets the reward of a move onto an empty cell. With `follow`, all ants of a queue
+    move at once, but a ring of ants does not move.
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -346,7 +345,8 @@ def fetching() -> Task:
     """Return the paper's task without its reward for moves onto a trail or nearer to the queen.
 
     An episode of one ant rewards only one pick-up and one delivery. Therefore circling does not
-    pay, and the best policy delivers, at discounts from 0.9 to 0.999 (`docs/how-to/train_an_agent.md`).
+    pay, and the best policy delivers, at discounts from 0.9 to 0.999; see
+    `docs/how-to/train_an_agent.md`.
     """
     return Task(rewards=Rewards(shaping=0))
 

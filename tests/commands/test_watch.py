@@ -42,13 +42,16 @@ def test_ctrl_c_ends_the_replay_of_a_session(kernels: Path, tmp_path: Path) -> N
     replace(log, steps=10**9, ticks=10**9).write(tmp_path / "endless.npz")
     # Compiles some kernels.
     assert run("watch", ["--duration", 1], kernels, tmp_path).returncode == 0
-    process = start("watch", ["--session", tmp_path / "endless.npz"], kernels, tmp_path)
-    time.sleep(3)
-    assert process.poll() is None
-    began = time.monotonic()
-    process.send_signal(signal.SIGINT)
-    printed, said = process.communicate(timeout=30)
-    assert time.monotonic() - began < promptly()
+    with start("watch", ["--session", tmp_path / "endless.npz"], kernels, tmp_path) as process:
+        try:
+            time.sleep(3)
+            assert process.poll() is None
+            began = time.monotonic()
+            process.send_signal(signal.SIGINT)
+            printed, said = process.communicate(timeout=30)
+            assert time.monotonic() - began < promptly()
+        finally:
+            process.kill()
     assert (process.returncode, printed, said) == (130, "", "Stopped.\n")
 
 

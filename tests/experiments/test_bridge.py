@@ -123,10 +123,12 @@ def test_late_shares_are_of_the_second_half(found: dict) -> None:
 
 def test_few_seeds_give_no_intervals_and_the_report_says_how_many(found: dict) -> None:
     """Nor do ten of which some had no crossing."""
-    text = bridge_report.report(found, 3000)
-    assert text.count("3 seeds, too few for") == 2  # a table each
-    assert "[" not in text
-    assert "[" not in bridge_report.report(counts(10), 3000)
+    text = repr(bridge_report.tables(found, 3000))
+    assert text.lower().count("3 seeds, too few for") == 3  # a table each
+    for crossed in (found, counts(10)):
+        rows = [row for one in bridge_report.tables(crossed, 3000).values() for row in one.rows]
+        assert "[" not in "".join(cell for row in rows for cell in row)
+    assert len(bridge_report.tables(found, 3000)["settings"].rows) == 13
 
 
 def test_shares_after_a_late_opening() -> None:
@@ -137,13 +139,14 @@ def test_shares_after_a_late_opening() -> None:
     crossed[5:, 0, 1] = 10 - crossed[5:, 0, 0]
     crossed[:, 0, :, 0] = crossed[:, 0, ::-1, 0]  # this one ends with 10 %
     crossed[:, :, :, -1] = 0
-    text = bridge_report.report({Case(): {LATE: crossed}}, 3000)
-    (foragers,) = [line for line in text.splitlines() if " foragers " in line]
-    *means, low, high, colonies, of, all_of_them = foragers.split()[6:]
-    assert means == ["17", "34", "50", "66", "83"]
-    assert float(low[1:-1]) < 83 < float(high[:-1])
-    assert (colonies, of, all_of_them) == ("10", "of", "11")
-    assert "opens after 3000 ticks" in text
+    late = bridge_report.tables({Case(): {LATE: crossed}}, 3000)["late"]
+    (foragers,) = [row for row in late.rows if row[3] == "foragers"]
+    *means, last, colonies = foragers[4:]
+    assert means == ["17", "34", "50", "66"]
+    mean, low, high = last.split()
+    assert float(low[1:-1]) < float(mean) == 83 < float(high[:-1])
+    assert colonies == "10 of 11"
+    assert "opens after 3000 ticks" in late.title
 
 
 def test_colonies_in_which_nobody_crosses_are_left_out_of_the_figure(

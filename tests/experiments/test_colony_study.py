@@ -21,6 +21,7 @@ SMALL = [
 FILES = {
     *("conditions.csv", "differences.csv", "seeds.csv", "manifest.json"),
     *("report.html", "report.txt", "study.json"),
+    *("tables/colony_elsewhere.json", "tables/colony_glance.json"),
     *(f"figures/{name}.png" for name in ("elsewhere", "rules", "scaling", "training")),
     *(
         f"policies/paper_{rules}_{ants}.npz"

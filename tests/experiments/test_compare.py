@@ -55,6 +55,8 @@ FILES = {
     *("manifest.json", "report.html", "report.txt", "study.json"),
     *("summary.csv", "table2.csv"),
     *(f"policies/{name}.npz" for name in SHOWN),
+    *(f"tables/paper_{one}.json" for one in ("return", "steps", "late_steps")),
+    *(f"tables/paper_{one}.json" for one in ("claims", "policies", "verdicts")),
     *FIGURES,
 }
 

@@ -65,9 +65,15 @@ def test_the_package_replays_a_link(ask):
     assert not lab.replay(f"https://example.org/lab.html#{code};{tick};{int(told, 16) ^ 1:x}").equal
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("learner", range(3))
-@pytest.mark.parametrize("rules", lab.RULES)
+# Each rule with one learner; the other pairs take a minute.
+PAIRS = [
+    pytest.param(rules, n, marks=pytest.mark.slow if n == k % 3 else pytest.mark.long)
+    for k, rules in enumerate(lab.RULES)
+    for n in range(3)
+]
+
+
+@pytest.mark.parametrize(("rules", "learner"), PAIRS)
 def test_kernels_agree(rules, learner, ask):
     more = {"regrowth": -1} if rules == 7 else {"regrowth": 30} if rules == 15 else {}
     visit = ask("visit", scene=scene(rules, learner, **more), changes=busy(900), ticks=900)

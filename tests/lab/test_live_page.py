@@ -15,10 +15,13 @@ FILE = Path(__file__).parents[2] / "docs" / "live.html"
 VISIT = "AQAPVUAeZIQHAQrYBAECwwII_hAeAB4ABTYAHgUWABYABS4AHgUWACYAByEJ3gwHBARkABy2BwAsBA"
 TICK = 433  # a wall and a larger number of ants before it
 WORLD = """() => {
-  const { history } = viewer, moment = history.length - 1, { ground, trail } = history.worldAt(moment);
-  const { cells, poses, tick } = history.frames[moment];
-  return [tick, [...cells], poses.reduce((sum, pose) => sum + (pose >> 3), 0), [...ground], [...trail]];
+  const { history } = viewer, moment = history.length - 1, { frames } = history;
+  const { ground, trail } = history.worldAt(moment), { cells, poses, tick } = frames[moment];
+  const loaded = poses.reduce((sum, pose) => sum + (pose >> 3), 0);
+  return [tick, [...cells], loaded, [...ground], [...trail]];
 }"""
+ROCKS = """() => viewer.history.worldAt(viewer.history.length - 1)
+    .ground.filter((one) => one === 5).length"""
 
 
 def until(tab, script):
@@ -38,7 +41,7 @@ def test_a_visit_can_be_looked_back_at_continued_and_saved(tmp_path):
         tab.on("pageerror", lambda error: faults.append(str(error)))
         tab.on("console", lambda message: faults.append(message.text))
         tab.goto(f"{FILE.as_uri()}#{VISIT};{TICK};0")
-        until(tab, f"() => viewer?.history.frames.at(-1).ticks === {TICK}")
+        until(tab, f"() => window.viewer?.history.frames.at(-1).ticks === {TICK}")
         colony = lab.played(*lab.decoded(VISIT), TICK)
         tick, cells, loaded, ground, trail = tab.evaluate(WORLD)
         snapshot = colony.snapshot()
@@ -50,29 +53,26 @@ def test_a_visit_can_be_looked_back_at_continued_and_saved(tmp_path):
         # Each tick before can be seen, with what the ants did.
         tab.keyboard.press("Home")
         until(tab, "() => viewer.player.moment === 0")
-        assert (
-            tab.evaluate("() => viewer.history.frames.filter(({ acts }) => acts.length).length")
-            == TICK
-        )
+        acted = tab.evaluate("viewer.history.frames.filter(({ acts }) => acts.length).length")
+        assert acted == TICK
         assert tab.evaluate("() => viewer.history.events.length > 20")
         tab.keyboard.press("End")
         # It goes on: a wall, some ticks, an undo.
         tab.keyboard.press("2")
         box = tab.locator("#world").bounding_box()
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        rocks = "() => viewer.history.worldAt(viewer.history.length - 1).ground.filter((one) => one === 5).length"
-        before = tab.evaluate(rocks)
+        before = tab.evaluate(ROCKS)
         tab.mouse.move(x - 30, y)
         tab.mouse.down()
         tab.mouse.move(x + 30, y, steps=4)
         tab.mouse.up()
-        until(tab, f"() => ({rocks})() > {before}")
+        until(tab, f"() => ({ROCKS})() > {before}")
         tab.keyboard.press(" ")
         until(tab, f"() => viewer.history.frames.at(-1).ticks > {TICK + 4}")
         tab.keyboard.press(" ")
         tab.click("#undo")
         until(
-            tab, f"() => viewer.history.frames.at(-1).ticks === {TICK} && ({rocks})() === {before}"
+            tab, f"() => viewer.history.frames.at(-1).ticks === {TICK} && ({ROCKS})() === {before}"
         )
         for name in ("new", "load", "quit"):
             assert not tab.is_visible(f"#{name}")  # these need a server
@@ -83,6 +83,6 @@ def test_a_visit_can_be_looked_back_at_continued_and_saved(tmp_path):
             tab.click("[data-export=page]")
         saved.value.save_as(tmp_path / "recording.html")
         tab.goto((tmp_path / "recording.html").as_uri())
-        until(tab, "() => viewer?.history.length === 2")
+        until(tab, "() => window.viewer?.history.length === 2")
         context.close()
         assert faults == []

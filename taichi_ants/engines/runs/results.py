@@ -165,7 +165,9 @@ class RolloutArguments:
 class Trace(Record):
     """The record of n steps; cell, heading and state are those before the action.
 
-    Attributes (int32 (n,) unless noted):
+    Arrays are int32 (n,) unless noted.
+
+    Attributes:
         episodes: Number of the episode, from 0, or of the policy if there are several.
         steps: Number of the step in its episode, from 0.
         cells: int32 (n, 3), cube coordinates in normal form.

@@ -80,7 +80,7 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK, LONG = (0, 1, 10, 13), (2, 3, 4, 5, 6, 7, 8, 14)
+QUICK, LONG = (0, 1, 10, 13), (2, 3, 4, 5, 6, 7, 8, 9, 14)
 
 
 def marked(kernels: list, quick: tuple[int, ...], long: tuple[int, ...]) -> list:
@@ -97,7 +97,7 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
     seen = np.zeros(5, dtype=int)
     later = KERNELS.index(kernel) not in QUICK
     is_large = observations.get(observation).n_states >= 1000
-    for seed in range(8 if is_large else 12 if later else 20):
+    for seed in range(8 if is_large or later else 12):
         rewards, changes = random_rewards(seed), kernel is not KERNELS[0]
         drawn = of_kernel(seed, *parts, rewards=rewards, changes=changes, **rules)
         if drawn.sharing == "independent":  # newborn ants begin with these values
@@ -110,8 +110,7 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
         seen += happened(plain, "births", "deaths", "regrown", "deliveries", "blocked")
     rarely = "noise" in str(rules)  # ants that slip or misread deliver rarely
     births = not (rarely or later or observation == "queues")
-    deliveries = 2 - rarely - later
-    assert (seen >= [births, 3, 3, deliveries, 6 if later else 12]).all(), seen
+    assert (seen >= [births, 3, 3, not rarely, 6]).all(), seen
 
 
 # Learner, sharing, observation, dense, traffic, view; nests, kinds of food, several loads.
@@ -134,12 +133,12 @@ def with_strangers(view):
     return index
 
 
-@pytest.mark.parametrize("kernel", marked(NESTS, (0, 3), (2,)), ids=str)
+@pytest.mark.parametrize("kernel", marked(NESTS, (0, 3), (1, 2)), ids=str)
 def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers):
     """Deliveries by nest and kind, loads, regrowth, births by nest: two episodes each."""
     learner, sharing, observation, *rules, nests, kinds, loads = kernel
     seen, simple = np.zeros(5, dtype=int), observation.replace("other_nest_ants", "paper")
-    for seed in range(24):
+    for seed in range(16):
         drawn = of_kernel(seed, learner, sharing, simple, *rules)
         drawn = with_nests(drawn, seed, nests, kinds, loads)
         if observation == "other_nest_ants":
@@ -169,13 +168,13 @@ CASTES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("kernel", marked(CASTES, (0, 2), (1, 3)), ids=str)
+@pytest.mark.parametrize("kernel", marked(CASTES, (0, 2), (1, 3, 4)), ids=str)
 def test_every_tick_with_castes_and_division_of_labour(kernel):
     """Numbers, tables, cues and deposits of castes, births, thresholds and idle ants."""
     *parts, castes, labour, nests, more = kernel
     seen, cues = np.zeros(6, dtype=int), more.get("cues_of")
     rules = {name: one for name, one in more.items() if name != "cues_of"}
-    for seed in range(18):
+    for seed in range(12):
         drawn = of_kernel(seed, *parts, **rules)
         if nests > 1:
             drawn = with_nests(drawn, seed, nests, 1, loads=False)

@@ -90,13 +90,13 @@ def drawn_cases(kernel, seed, n_worlds):
 def test_every_tick_of_drawn_protocols_equals_the_reference(kernel):
     done, refused = Counter(), 0
     several = len(kernel) > 8
-    for seed in range((8 if several else 7) if kernel in QUICK else 12):
+    for seed in range(8 if several else 7):
         n_worlds = 1 + 2 * (seed % 3 > 0)
         places, task, training, first, rules, protocol = drawn_cases(kernel, seed, n_worlds)
         if several and places[0].n_nests == 1:
             continue  # the world is too small; kernels are compiled for a number of nests
         seeds = [first + w for w in range(n_worlds)]
-        by_chunk = kernel is WITH_CASTES or (kernel not in QUICK and seed % 2)
+        by_chunk = kernel is WITH_CASTES
         schedule = "by_chunk" if by_chunk else "by_world"
         try:
             colony = Colony(places, task, training, seeds, **rules, schedule=schedule)

@@ -107,7 +107,7 @@ def test_every_step_in_random_worlds(learner, observation, deposit):
     """Several foods, rocks, trails of all strengths; deliveries and choices among foods occur."""
     delivered = 0
     n_states = observations.get(observation).n_states
-    for seed in range(12 if n_states < 1000 else 8):
+    for seed in range(8 if n_states < 1000 else 6):
         task = drawn_task(seed, observation, deposit)
         config, world = random_config(seed, learner), random_world(seed)
         plain = assert_equal_steps(world, config, seed - 7, 4, 25, task)
