@@ -19,7 +19,7 @@ from functools import partial
 
 import numpy as np
 from cores import COLONIES, Q_LEARNING, colony_of
-from measuring import PAGE, ROOT, a_ratio, machine, pace, publish
+from measuring import ROOT, a_ratio, machine, pace, publish
 
 from taichi_ants import AntsError, Task, runtime, train, worlds
 from taichi_ants.analysis.tables import Table, figure, plain_text
@@ -165,12 +165,19 @@ def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
             rows[case] = [case, f"FAILED: {error}"]
         print(*rows[case], sep="  ", flush=True)
     paces = [row for case, row in rows.items() if case in measures]
-    results = [row for case, row in rows.items() if case in compared]
+    results = [summary(kind, rows) for kind in ("environments", "training", "colony")]
     columns = ["M steps/s", "measured", "goal", "share of it"]
     return [
         *([Table("Speed on a GPU", columns, paces)] if paces else []),
-        Table("Results, compared with a CPU's", ["case", ""], results, [about]),
+        Table("Results", ["", "cases", "equal to a CPU's", "not equal"], results, [about]),
     ]
+
+
+def summary(kind: str, rows: dict[str, list[str]]) -> list[str]:
+    """Return the row of all cases of a kind: how many are equal, and which are not."""
+    found = {case: row[1] for case, row in rows.items() if case.startswith(kind)}
+    others = [f"{case}: {result}" for case, result in found.items() if result != "equal"]
+    return [kind, str(len(found)), str(len(found) - len(others)), "; ".join(others)]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -180,7 +187,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add("--seconds", type=a_ratio, default=200.0, help="begin no part later")
     add("--only", metavar="WORD", default="", help="compare results whose name has this word")
     add("--on-cpu", action="store_true", help="run kernels for a GPU on the CPU")
-    add("--publish", action="store_true", help=f"write the tables to {PAGE.name}")
+    add("--publish", action="store_true", help="write the tables to docs/results/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)
@@ -189,8 +196,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         tables = measured(given.seconds, given.on_cpu, given.only)
         print(plain_text(tables, 120), end="")
         if given.publish:
-            publish("gpu", tables, PAGE)
-        if any(row[1].startswith(("DIFFERENT", "FAILED")) for one in tables for row in one.rows):
+            publish("performance_gpu", tables)
+        if any(word in str(tables) for word in ("DIFFERENT", "FAILED")):
             raise AntsError("some parts failed, or differ from those of a CPU.")
 
     run_command(command)

@@ -55,6 +55,7 @@ ARCHIVE = "tests/commands/test_archive.py"
 ODD = "tests/report/test_odd.py"
 NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
+ON_GPU = "tests/engines/test_gpu.py"
 LONE_NOISE = "tests/envs/test_noise.py"
 DESIGN = "tests/studies/test_design.py"
 FEATURES = "tests/test_features.py"
@@ -154,6 +155,14 @@ MUTATIONS = [
     ("task/rules/policy.py", "cumulative <= drawn", "cumulative < drawn / 2", CHOICE),
     ("task/rules/policy.py", "(is_open_at * is_nearer).sum() > 0", "False", COLONY),
     ("arithmetic/numbers.py", "if m > ti.f64(SQRT_2)", "if m > ti.f64(2.0)", NUMBERS),
+    ("arithmetic/guards.py", "result = mul(a, b)\n", "return mul(a, b)\n", ON_GPU),
+    ("arithmetic/guards.py", "hidden(divisor, next(uses))", "divisor", ON_GPU),
+    (
+        "engines/runs/rollout_kernel.py",
+        "record(a, t * a.n + i, code)",
+        "record(a, i, code)",
+        ON_GPU,
+    ),
     ("features/noise.py", "ti.cast(other >= code", "ti.cast(other > code", CHOICE),
     (
         "task/rules/vision.py",
