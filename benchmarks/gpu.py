@@ -90,8 +90,12 @@ def speed_of_colony(ants: int, n_worlds: int) -> float:
     return pace(ticks, 2.0)[0] / 1e6
 
 
-def speed_of_training() -> float:
+def speed_of_training(threads_of_block: int) -> float:
     """Return million steps/s of runs that learn by Q-learning in the paper's world."""
+    from taichi_ants.engines.runs import kernels
+
+    kernels.THREADS_OF_BLOCK = threads_of_block
+    kernels.run_kernel.cache_clear()
     for _ in range(2):
         done = train(worlds.paper(), Q_LEARNING, range(MANY), 30, task=Task(delivery="truncates"))
     return float(done.steps.sum(dtype=np.int64) / done.seconds / 1e6)
@@ -117,12 +121,14 @@ def speed_of_environments(rolls: bool) -> float:
 # Their goals, or None.
 SPEEDS: dict[str, tuple[float | None, Callable[[], float]]] = {
     "colony, 1 000 000 ants": (1500, partial(speed_of_colony, *COLONIES[0])),
-    "`train`, 65 536 runs": (3000, speed_of_training),
+    "`train`, 65 536 runs": (3000, partial(speed_of_training, 32)),
     "`rollout`, 65 536 environments": (2000, partial(speed_of_environments, True)),
     "colony, 100 000 ants": (400, partial(speed_of_colony, *COLONIES[1])),
     "colony, 4 096 worlds of 64 ants": (1000, partial(speed_of_colony, *COLONIES[3])),
     "colony, 10 000 ants": (None, partial(speed_of_colony, *COLONIES[2])),
     "`step`, 65 536 environments": (None, partial(speed_of_environments, False)),
+    "`train`, blocks of 1 thread": (None, partial(speed_of_training, 1)),
+    "`train`, blocks of 128 threads": (None, partial(speed_of_training, 128)),
 }
 
 
