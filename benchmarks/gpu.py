@@ -147,7 +147,7 @@ def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
     expected = environments() if word in "environments" else ""
     about, measures = machine(("taichi", "numpy")), {} if on_cpu else SPEEDS
     if on_cpu:
-        runtime.gpu_kernels_on_cpu = True
+        runtime.gpu_kernels_on_cpu, about = True, f"Without a GPU, on a CPU: {about}"
     else:
         name, bandwidth = card()
         about = f"{name}, {figure(bandwidth / 1e12)} TB/s; {about}"
@@ -161,7 +161,7 @@ def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
             elif case in measures:
                 goal, measure = measures[case]
                 rows[case] = [case, figure(found := measure()), "", ""]
-                if goal:
+                if goal and bandwidth:
                     goal *= bandwidth / _H200
                     rows[case][2:] = figure(goal), figure(found / goal)
             else:
@@ -175,7 +175,7 @@ def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
     columns = ["M steps/s", "measured", "goal", "share of it"]
     return [
         *([Table("Speed on a GPU", columns, paces)] if paces else []),
-        Table("Results", ["", "cases", "equal to a CPU's", "others"], results, [about]),
+        Table("Results of kernels for a GPU", ["", "cases", "equal to a CPU's", "others"], results, [about]),
     ]
 
 
