@@ -221,12 +221,6 @@ MUTATIONS = [
     ("engines/colony/learning.py", "shape[0] - 1)]  #", "shape[0] - 2)]  #", COLONY),
     ("engines/colony/learning.py", "c.initial_q, 0.0)", "0.0, 0.0)", COLONY),
     ("engines/colony/learning.py", "if number > c.sums_of", "if number < c.sums_of", SCHEDULES),
-    (
-        "engines/colony/steps.py",
-        "c.tallies[chunk * TALLY_WIDTH + state] += n",
-        "c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n",
-        BY_ANT,
-    ),
     ("engines/colony/learning.py", "ti.atomic_max(c.latest", "ti.atomic_min(c.latest", BY_ANT),
     ("engines/colony/kernels.py", "if running == 1 and slot <", "if slot <", BY_ANT),
     ("engines/colony/device.py", "if numbers != self._numbers:", "if not self._numbers:", BY_ANT),
