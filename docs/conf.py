@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 URLS = PROJECT.get("urls", {})
 
 project = "Taichi Ants"
-author = "the Taichi Ants contributors"
+author = PROJECT["authors"][0]["name"]
+copyright = author
 release = PROJECT["version"]
 extensions = [
     "myst_nb",
@@ -50,6 +52,7 @@ html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = project
 html_static_path = ["_static"]
+html_favicon = "_static/favicon.svg"
 html_css_files = ["site.css"]
 html_show_sphinx = False
 html_copy_source = False
@@ -58,7 +61,7 @@ if "Repository" in URLS:
     html_theme_options["source_directory"] = "docs/"
 # Where the site is; sitemaps and cards need it. Without an address, that of a local server.
 html_baseurl = os.environ.get("DOCS_URL", URLS.get("Documentation", "http://localhost:8000/"))
-APPS = ("lab.html", "article.html", "lessons.html", "live.html")  # complete pages, not Sphinx's
+APPS = tuple(path.name for path in sorted(DOCS.glob("*.html")))  # complete pages, not Sphinx's
 html_extra_path = list(APPS)
 notfound_urls_prefix = urlparse(html_baseurl).path
 
@@ -94,6 +97,20 @@ def visit_math(self: Any, node: Any) -> None:
     raise nodes.SkipNode
 
 
+def draw_card(app: Any) -> None:
+    """Draw the picture that shared links show: the last moment of the film of the README."""
+    from PIL import Image
+
+    folder = Path(app.outdir) / "_static"
+    folder.mkdir(parents=True, exist_ok=True)
+    with Image.open(ROOT / "renders" / "hero_dark.webp") as film:
+        film.seek(film.n_frames - 1)  # type: ignore[attr-defined]
+        card = Image.new("RGB", (1200, 630), film.convert("RGB").getpixel((2, 2)))  # type: ignore[arg-type]
+        picture = film.convert("RGB").resize((1008, 630))
+        card.paste(picture, (96, 0))
+        card.save(folder / "card.png")
+
+
 def write_sitemap(app: Any, error: Exception | None) -> None:
     """List the pages for search engines."""
     if error or app.builder.name != "html":
@@ -108,7 +125,17 @@ def write_sitemap(app: Any, error: Exception | None) -> None:
     )
 
 
+def copy_notebooks(app: Any, error: Exception | None) -> None:
+    """Copy the lessons as notebooks, to which lessons.html links."""
+    if error or app.builder.name != "html":
+        return
+    for path in (DOCS / "lessons").glob("*.ipynb"):
+        shutil.copy(path, Path(app.outdir) / "lessons")
+
+
 def setup(app: Any) -> None:
     app.connect("doctree-read", link_apps, priority=100)
+    app.connect("builder-inited", draw_card)
     app.connect("build-finished", write_sitemap)
+    app.connect("build-finished", copy_notebooks)
     app.add_html_math_renderer("mathml", (visit_math, None), (visit_math, None))

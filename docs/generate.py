@@ -50,7 +50,7 @@ def settings_table(owner: Any, path: str = "") -> str:
 
 def groups_of(owner: Any) -> Iterator[str]:
     """Yield the tables of a class of settings and of its groups, each after its docstring."""
-    about = (owner.__doc__ or "").partition("\n\nAttributes:")[0]
+    about = re.split(r"\n\n(?:Attributes:|>>> )", owner.__doc__ or "")[0]
     yield f"### `{owner.path}`: {owner.__name__}\n\n{about}"
     if declared(owner):
         yield settings_table(owner)
@@ -212,6 +212,11 @@ MODULES = (
 )
 
 
+def imported(module: str) -> Any:
+    """Return a module of the package; "" is the package."""
+    return import_module(f"taichi_ants.{module}".rstrip("."))
+
+
 def public_names(module: Any) -> list[str]:
     """Return the public names of a module that are not modules; by default, what it defines."""
     names = getattr(module, "__all__", None)
@@ -224,7 +229,7 @@ def public_names(module: Any) -> list[str]:
 # Data of the package, whose values have no docstrings.
 DATA = {
     "BUILT_IN": "The measures of the package by name, see [measures](../measures.md).",
-    "KINDS": "The kinds of rules by name, with their results and [inputs](../rules.md).",
+    "KINDS": "The kinds of rules by name, with their results and [inputs](../rule_inputs.md).",
     "LEARNERS": "The learners of the reference by name, in plain Python.",
     "OBSERVATIONS": "The observations of the reference by name, in plain Python.",
     "PAUSE": "Seconds for which an animation shows its last picture.",
@@ -236,8 +241,8 @@ def api(module: str, seen: dict[int, str]) -> str:
 
     Names in `seen`, of pages before, are links.
     """
-    name = f"taichi_ants.{module}".rstrip(".")
-    found = import_module(name)
+    found = imported(module)
+    name = found.__name__
     here, elsewhere, data = [], [], []
     for public in sorted(public_names(found), key=str.lower):
         value = getattr(found, public)

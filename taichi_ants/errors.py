@@ -18,6 +18,12 @@ class AntsError(ValueError):
 
     The message is one sentence that names the value, what is allowed, and what to do. A very long
     message is cut in the middle. Commands print it on standard error and exit with status 2.
+
+    >>> try:
+    ...     worlds.build("papre")
+    ... except AntsError as error:
+    ...     print(str(error).partition(" (")[0])
+    there is no world 'papre'
     """
 
     def __init__(self, message: object) -> None:

@@ -73,6 +73,10 @@ def replay(link: str) -> Replayed:
 
     Raises:
         AntsError: The link is damaged, or is not one of the lab.
+
+    >>> link = "AQAPVUAeZIQHAQrYBAECwwII_hAeAB4ABTYAHgUWABYABS4AHgUWACYAByEJ3gwHBARkABy2BwAsBA"
+    >>> replay(link + ";433;bcf73002ff82a05c").hash
+    'bcf73002ff82a05c'
     """
     expect("link", link, str)
     try:

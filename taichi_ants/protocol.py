@@ -72,7 +72,11 @@ class ProtocolEvent(ShorthandSettings):
 
 @dataclass(frozen=True)
 class At(ProtocolEvent, path="at"):
-    """Interventions after a number of ticks of each episode."""
+    """Interventions after a number of ticks of each episode.
+
+    >>> len(At(500, remove_ants=0.5, epsilon=0.2).interventions)  # at tick 500
+    2
+    """
 
     tick: Annotated[Tick, Setting("time of the event")]
 
@@ -83,7 +87,11 @@ class At(ProtocolEvent, path="at"):
 
 @dataclass(frozen=True)
 class Every(ProtocolEvent, path="every"):
-    """Interventions at regular ticks of each episode."""
+    """Interventions at regular ticks of each episode.
+
+    >>> [*Every(100, trail=0).times(350)]  # clear the trail at these ticks
+    [100, 200, 300]
+    """
 
     ticks: Annotated[Interval, Setting("time between two events")]
     start: Annotated[Bound, Setting("time of the first event; `ticks` if left out")] = None
@@ -112,6 +120,9 @@ class When(ProtocolEvent, path="when"):
     Each world is checked for itself, every `interval` ticks. While the measure has no value, the
     event does not happen. With `once`, the event happens at most once in an episode, else at each
     check for which the condition holds.
+
+    >>> When("deliveries", above=20, ants=10).holds(21)
+    True
     """
 
     measure: Annotated[str, Setting("name of a registered measure")]

@@ -280,7 +280,8 @@ class _Documentation:
         lines = [cleandoc(self._text), "", "Attributes:"]
         for setting in declared(cls):
             values, default, meaning = setting.in_words
-            line = f"{setting.name}: {meaning}; {values} (default: {default})."
+            absent = default if default == "required" else f"default: {default}"
+            line = f"{setting.name}: {meaning}; {values} ({absent})."
             lines.append(fill(line, 100, initial_indent=" " * 4, subsequent_indent=" " * 8))
         return "\n".join(lines)
 

@@ -102,6 +102,9 @@ def compare(
     Raises:
         AntsError: The seeds differ, a result does not have the measure or the configuration, or no
             seed has a value in both results.
+
+    >>> compare(result, train(worlds.paper(), config, range(3), 60), "returns").difference
+    0.0
     """
     values = []
     tables = _tables_of({"a": a, "b": b}).values()
@@ -128,6 +131,9 @@ def summary(result: Tidy, last: int | None = None) -> Summary:
     Args:
         result: The result of `Colony.run`, `train` or `evaluate`.
         last: The number of episodes to use, from the last one; None uses all.
+
+    >>> [row["measure"] for row in summary(result, last=10).rows][:3]
+    ['returns', 'steps', 'deliveries']
     """
     expect("result", result, Tidy)
     table, rows = result.measured(), []
@@ -155,6 +161,9 @@ def plot(results: Tidy | Mapping[str, Tidy], *measures: str) -> Figure:
 
     Raises:
         AntsError: A result does not have a measure, or the seeds differ.
+
+    >>> len(plot(result, "returns", "steps").axes)
+    2
     """
     tables = _tables_of(results if isinstance(results, Mapping) else {"": results})
     first, *others = tables.values()

@@ -83,6 +83,9 @@ def tabulate(
 
     Returns:
         Action values, float32 (n_states, 5). For actions, 1 for the action and 0 for all others.
+
+    >>> tabulate(lambda seen: seen[:, 0].astype(int)).shape  # an action in each state
+    (128, 5)
     """
     seen = ShownObservations(observations.get(observation), observation_format).table
     n_states, given = len(seen), np.asarray(function(seen))

@@ -49,6 +49,10 @@ class Field(Pheromone, path="task.fields.NAME"):
 
     All settings of `Pheromone` apply; `view` has an effect only if the field is a cue. Deposits
     that fade count ticks since the ant's last pick-up, delivery or birth, or since the start.
+
+    >>> home = Field(deposited_when="without_food")
+    >>> Task(observation="ants", fields={"home": home}, homing_cue="home").homing_cue
+    'home'
     """
 
     sentences: ClassVar[dict[str, str]] = {

@@ -22,6 +22,9 @@ class Life(Settings, path="task.life"):
 
     None means that ants do not die, food does not grow back, or food does not move. With `regrowth`
     0, food grows back in the same tick.
+
+    >>> Task(life=Life(births=True, lifespan=2000)).life.lifespan
+    2000
     """
 
     sentences: ClassVar[dict[str, str]] = {

@@ -29,6 +29,9 @@ class Pheromone(Settings, path="task.pheromone"):
 
     Other names of `evaporation` and `deposit` are those of your rules, see `taichi_ants.rules`.
     Trails that fade rise towards food if `slope` exceeds the evaporation.
+
+    >>> Pheromone("exponential", half_life=30).half_life
+    30.0
     """
 
     sentences: ClassVar[dict[str, str]] = {

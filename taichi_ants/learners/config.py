@@ -17,7 +17,7 @@ Factor = Annotated[float, Setting(above=0, most=1)]
 InitialValue = Annotated[float, Setting(least=-1_000_000, most=1_000_000)]
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True)
 class TrainingConfig(Settings, path="training"):
     """The learner and its settings, each declared with its range and meaning.
 
@@ -27,6 +27,9 @@ class TrainingConfig(Settings, path="training"):
     mapping or as keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. All others have the
     defaults of `taichi_ants.learners.get(name).hyperparameters()`. Training, not this class, checks
     that the learner exists and has these hyperparameters.
+
+    >>> TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=3).planning_steps
+    3
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -39,10 +42,7 @@ class TrainingConfig(Settings, path="training"):
         "epsilon_decay": "Each episode multiplies ε by {epsilon_decay}, down to {min_epsilon}.",
     }
 
-    learner: Annotated[
-        str,
-        Setting("name of the learner, such as sarsa or q_learning; see docs/reference/learners.md"),
-    ]
+    learner: Annotated[str, Setting("name of the learner, such as sarsa or q_learning")]
     # Smaller step sizes could underflow to zero in float32.
     learning_rate: Annotated[
         float, Setting("learning rate of the first episode", least=1e-37, most=1)

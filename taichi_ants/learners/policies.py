@@ -172,6 +172,10 @@ def save_policy(
         q_values: Action values of shape (n_states, 5), finite as float32.
         metadata: Origin of the policy (configuration, seed, world ...), in types of JSON.
         observation: Name of the registered observation whose states index the rows.
+
+    >>> import pathlib, tempfile
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "policy.npz")
+    >>> save_policy(path, result.q_values[0, 0], {"learner": "sarsa"})
     """
     table = checked_table(q_values, Task(observations.get(observation).name))
     expect("metadata", metadata, Mapping)
@@ -179,7 +183,14 @@ def save_policy(
 
 
 def load_policy(path: PathLike) -> Policy:
-    """Return the policy in a file that `save_policy` wrote; AntsError if it cannot be used."""
+    """Return the policy in a file that `save_policy` wrote; AntsError if it cannot be used.
+
+    >>> import pathlib, tempfile
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "policy.npz")
+    >>> save_policy(path, result.q_values[0, 0], {"seed": 0})
+    >>> load_policy(path).observation
+    'paper'
+    """
     with _KIND.reading(path) as (arrays, facts):
         observation, metadata = facts["observation"], facts["metadata"]
         expect("metadata", metadata, dict)

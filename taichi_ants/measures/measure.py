@@ -143,6 +143,9 @@ def register(
 
     Raises:
         AntsError: The name is not a word or belongs to a built-in measure, or `of` is wrong.
+
+    >>> measures.register("laden", lambda snapshot: snapshot.ant_carries.mean()).name
+    'laden'
     """
     if of is not None:
         check_one_of("of", of, (COUNTS, RUN))

@@ -54,6 +54,10 @@ class Dataset(Record):
 
     Raises:
         AntsError: The arrays are inconsistent.
+
+    >>> data = record(worlds.paper(), episodes=3, seeds=[0, 1])
+    >>> data.run.max().item(), len(data.reward) == len(data.action)
+    (1, True)
     """
 
     world: World

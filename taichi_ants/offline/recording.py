@@ -52,6 +52,10 @@ def record(
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
+
+    >>> data = record(worlds.paper(), config, episodes=2)
+    >>> data.state.dtype, data.episode.max().item()
+    (dtype('int32'), 1)
     """
     learns = isinstance(behaviour, TrainingConfig)
     task, max_steps = arguments.checked_run(world, task, max_steps, learns)
@@ -94,6 +98,10 @@ def record_colony(colony: Colony, episodes: int = 1, ticks: int = 1000) -> Datas
 
     Raises:
         AntsError: An argument is not allowed, or the colony has different worlds.
+
+    >>> data = record_colony(colony, ticks=20)
+    >>> data.agent.max().item(), len(data.reward)
+    (15, 320)
     """
     expect("colony", colony, Colony)
     uses = colony.worlds[0].uses() | colony.task.uses()

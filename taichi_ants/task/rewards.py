@@ -15,7 +15,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Rewards(Settings, path="task.rewards"):
-    """The reward of each event, a whole number; by default, those of table 1 of the paper."""
+    """The reward of each event, a whole number; by default, those of table 1 of the paper.
+
+    >>> Task(rewards=Rewards(shaping=0)).rewards.deliver
+    10
+    """
 
     sentences: ClassVar[dict[str, str]] = {
         "": "The rewards are {empty} for a move onto E, {shaping} onto T or S, {pick_up} for "

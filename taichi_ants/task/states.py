@@ -28,6 +28,7 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
     """Return a function that names states of n cells in view by the letters of their codes."""
 
     def name_of(row: int) -> str:
+        """Return the name of a state by its index."""
         row, codes = checked_whole("a state", row, 0, 2 * len(foraging) ** n_cells - 1), []
         for _ in range(n_cells):
             row, code = divmod(row, len(foraging))
@@ -38,7 +39,6 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
     return name_of
 
 
-# Returns the name of a state by its index.
 state_name = name_of_codes(3, *CELL_LETTERS)
 
 

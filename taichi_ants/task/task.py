@@ -88,6 +88,9 @@ class Task(Settings, path="task"):
     bootstraps from the next observation. Both end an episode of one ant. Kernels are compiled for
     an observation, a kind of pheromone, and rules of choice and noise; they read all other settings
     as numbers.
+
+    >>> Task(traffic="right_of_way").traffic.swap
+    True
     """
 
     sentences: ClassVar[dict[str, str]] = {

@@ -53,6 +53,9 @@ def open_world(
     drawn from 10 to 100. There are no trails and no listed ants. The same seed gives the same
     world. Raises AntsError if the shares add up to more than 0.9, or if ants could not reach food
     from the queen in any of 100 random worlds.
+
+    >>> worlds.open_world(seed=3, ranges=(8, 8, 8)).ranges
+    (8, 8, 8)
     """
     seed = whole("seed", seed)
     if rock_share + food_share > MAX_SHARE:

@@ -86,6 +86,9 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **settings: Any) 
 
     The seed is any whole number, which only some builders use; `settings` are those of the world.
     Raises AntsError if neither the name nor the file exists.
+
+    >>> worlds.build("open", seed=3).ranges
+    (10, 18, 53)
     """
     seed = whole("seed", seed)
     expect("the world", name_or_path, str, os.PathLike)

@@ -170,6 +170,9 @@ def to_text(world: World) -> str:
     """Return the map of a world; `from_text` reads it, with ants numbered in reading order.
 
     Raises AntsError for trails of several levels, and for trails under food or the queen.
+
+    >>> worlds.from_text(worlds.to_text(worlds.paper())) == worlds.paper()
+    True
     """
     expect("world", world, World)
     grid, levels = world.grid, np.unique(world.trails[:, 3])

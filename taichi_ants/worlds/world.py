@@ -53,6 +53,9 @@ class World:
     Raises:
         AntsError: A value has the wrong form, is outside the world or listed twice, or shares a
             cell. Only trails can share a cell, with the queen, food or ants.
+
+    >>> worlds.paper().grid.exists.sum().item()  # cells
+    271
     """
 
     ranges: tuple[int, int, int]

@@ -59,6 +59,10 @@ class Colony(TickingColony):
     Raises:
         AntsError: An argument is not allowed, the learner does not work in a colony or with a
             shared table, or a world has too few free cells for the ants.
+
+    >>> colony.tick(200)
+    >>> colony.ticks, colony.living.sum().item()
+    (200, 16)
     """
 
     def run(

@@ -25,6 +25,9 @@ class ColonyEpisodes(Record, Tidy):
     ants if there are no castes. Returns, moves, blocked and carried are int64, all others int32.
     `seeds` has the seed of each world. `series` has the values of the measures that you asked
     `Colony.run` for, else None.
+
+    >>> colony.run(episodes=3, ticks=200).deliveries.shape  # episodes, worlds
+    (3, 1)
     """
 
     returns: np.ndarray

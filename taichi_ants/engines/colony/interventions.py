@@ -360,6 +360,11 @@ class Interventions:
 
     Raises:
         AntsError: The colony does not have one of the worlds.
+
+    >>> from taichi_ants.interventions import RemoveAnts
+    >>> Interventions(colony).apply(RemoveAnts(number=6))
+    >>> colony.living.sum().item()
+    10
     """
 
     def __init__(

@@ -42,6 +42,9 @@ class TrainingResult(Record, Tidy):
 
     Raises:
         AntsError: The arrays do not fit the configurations and seeds.
+
+    >>> result.q_values.shape  # configurations, seeds, states, actions
+    (1, 3, 128, 5)
     """
 
     world: World
@@ -123,6 +126,9 @@ class Rollouts(Record, Tidy):
     """The result of `evaluate`: int32 arrays of shape q_values.shape[:-2] + (rollouts,).
 
     `seeds` has the seed of each table, in the order of the last of its leading axes.
+
+    >>> evaluate(worlds.paper(), result.q_values, seeds=range(3), rollouts=5).steps.shape
+    (1, 3, 5)
     """
 
     returns: np.ndarray
@@ -182,6 +188,10 @@ class Trace(Record):
         td_errors: float32 (n,), the TD error of the step; None without learning.
         tables: float32 (n, n_states, 5), the Q table after the step; None without learning.
         arguments: Those that reproduce it; None for several policies, or if you made it yourself.
+
+    >>> trace = trace_training(worlds.paper(), config, max_steps=50)
+    >>> trace.cells[0].tolist(), trace.actions.dtype
+    ([0, 8, 8], dtype('int32'))
     """
 
     episodes: np.ndarray

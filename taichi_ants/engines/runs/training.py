@@ -63,6 +63,9 @@ def train(
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
+
+    >>> train(worlds.paper(), config, seeds=range(3), episodes=60).returns.shape
+    (1, 3, 60)
     """
     task, max_steps = arguments.checked_run(world, task, max_steps, learns=True)
     configs = arguments.checked_configs(configs, task)
@@ -79,6 +82,9 @@ def continue_training(result: TrainingResult, episodes: int) -> TrainingResult:
 
     It equals, bit for bit, the result of a single training with the sum of the episodes; `seconds`
     is the time of the new ones. Errors are those of `train`.
+
+    >>> continue_training(result, 40).returns.shape
+    (1, 3, 100)
     """
     expect("result", result, TrainingResult)
     arguments.checked_configs(result.configs)
@@ -149,6 +155,9 @@ def evaluate(
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
+
+    >>> evaluate(worlds.paper(), result.q_values, seeds=range(3)).deliveries.shape
+    (1, 3, 50)
     """
     task, max_steps = arguments.checked_run(world, task, max_steps)
     tables = checked_values(q_values, task)
@@ -181,6 +190,9 @@ def rollout(
 
     Instead of the table, you can pass the `TrainingResult` of a single run, or a `Policy`. Other
     arguments and errors are those of `evaluate`. Numbers start at 0.
+
+    >>> rollout(worlds.paper(), result.q_values[0, 0]).headings[0].item()
+    0
     """
     task, max_steps = arguments.checked_run(world, task, max_steps)
     table = checked_table(q_values, task)
@@ -214,6 +226,9 @@ def trace_training(
 
     Arguments and errors are those of `train`; episodes * max_steps * n_states is limited to 12.8
     million.
+
+    >>> trace_training(worlds.paper(), config, max_steps=50).tables.shape
+    (50, 128, 5)
     """
     task, max_steps = arguments.checked_run(world, task, max_steps, learns=True)
     episodes = checked_whole("episodes", episodes)

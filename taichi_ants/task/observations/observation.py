@@ -65,6 +65,9 @@ class Observation:
         letters: The meaning of letters in names other than the paper's E, O, T, S, F and Q.
         shape: The number of values of each part of a state index, if it has several parts.
             Environments show neural networks each part.
+
+    >>> task.observations.get("ants").parts
+    (2, 6, 6, 6)
     """
 
     name: str
