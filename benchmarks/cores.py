@@ -35,12 +35,18 @@ def pace_of(work: Callable[[], int]) -> float:
     return work() / (time.perf_counter() - began) / 1e6
 
 
-def colony_works(ants: int, n_worlds: int) -> Iterator[tuple[str, Work]]:
-    """Yield the kernels alone and `tick`, with eight cells per ant."""
+def colony_of(ants: int, n_worlds: int) -> Colony:
+    """Return a colony whose ants learn while they forage, with eight cells for each of them."""
     side = max(6, round((8 * ants / 3) ** 0.5) + 1)
     world = worlds.open_world(1, (side, side, side))
     colony = Colony(world, foraging(), SARSA, range(n_worlds), ants, start="spread")
     colony.begin_episode()
+    return colony
+
+
+def colony_works(ants: int, n_worlds: int) -> Iterator[tuple[str, Work]]:
+    """Yield the kernels alone and `tick`."""
+    colony = colony_of(ants, n_worlds)
     steps = ants * n_worlds
     ticks = max(2, _STEPS // steps)
 

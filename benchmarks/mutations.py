@@ -30,6 +30,7 @@ NESTS = "tests/engines/colony/test_nests.py"
 RASTER = "tests/rendering/test_raster.py"
 CASTES = "tests/engines/colony/test_castes.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
+BY_ANT = "tests/engines/colony/test_by_ant.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
 FINDINGS = "tests/analysis/test_findings.py"
@@ -211,6 +212,16 @@ MUTATIONS = [
     ("engines/colony/learning.py", "shape[0] - 1)]  #", "shape[0] - 2)]  #", COLONY),
     ("engines/colony/learning.py", "c.initial_q, 0.0)", "0.0, 0.0)", COLONY),
     ("engines/colony/learning.py", "if number > c.sums_of", "if number < c.sums_of", SCHEDULES),
+    (
+        "engines/colony/steps.py",
+        "c.tallies[chunk * TALLY_WIDTH + state] += n",
+        "c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n",
+        BY_ANT,
+    ),
+    ("engines/colony/learning.py", "ti.atomic_max(c.latest", "ti.atomic_min(c.latest", BY_ANT),
+    ("engines/colony/kernels.py", "if running == 1 and slot <", "if slot <", BY_ANT),
+    ("engines/colony/device.py", "if numbers != self._numbers:", "if not self._numbers:", BY_ANT),
+    ("engines/colony/device.py", "shape) != (array", "shape) == (array", BY_ANT),
     ("engines/colony/steps.py", "moves & (1 - enters)", "moves & enters", COLONY),
     ("engines/colony/steps.py", "tick) > level_of", "tick) >= level_of", TRAFFIC),
     ("engines/colony/steps.py", "c.carried[ant] = 1", "c.carried[ant] = 0", COLONY),

@@ -88,6 +88,14 @@ def link_apps(app: Any, doctree: nodes.document) -> None:
             node.replace_self(nodes.reference("", "", *node.children, refuri=uri))
 
 
+def mend_page(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
+    """Give captions of the navigation their level, and let the keyboard scroll wide code."""
+    tree = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
+    if "body" in context:
+        context["body"] = re.sub(r"<pre(?= id=|>)", '<pre tabindex="0"', context["body"])
+
+
 def visit_math(self: Any, node: Any) -> None:
     """Write a formula as MathML, which browsers draw and read aloud without a script."""
     inline = isinstance(node, nodes.math)
@@ -126,6 +134,7 @@ def write_sitemap(app: Any, error: Exception | None) -> None:
 
 def setup(app: Any) -> None:
     app.connect("doctree-read", link_apps, priority=100)
+    app.connect("html-page-context", mend_page, priority=900)  # after the theme
     app.connect("builder-inited", draw_card)
     app.connect("build-finished", write_sitemap)
     app.add_html_math_renderer("mathml", (visit_math, None), (visit_math, None))

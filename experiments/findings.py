@@ -69,7 +69,7 @@ def winners(results: Path) -> np.ndarray:
 
 
 def deliveries() -> dict[str, tuple[int, ...]]:
-    """Return deliveries in the paper's world by rules: learned, and with a policy by hand."""
+    """Return deliveries in the paper's world by rules: learned, and by the hand-written policy."""
     place, hands = "fixed_rules; the paper's world", ("learned", "by hand")
     return {
         rules: tuple(int(published.cell(f"{place}; {rules}; {one}")) for one in hands)

@@ -67,7 +67,7 @@ PAGES = {
         (
             *(f"page/{name}.js" for name in (*_SHARED, "mind", "scenes")),
             *(f"article/{name}.js" for name in ("pieces", "world")),
-            *("lessons/random.js", "../docs/lessons/page/room.js"),
+            *("../docs/lessons/page/random.js", "../docs/lessons/page/room.js"),
             *("../docs/lessons/page/experiments.js", "lessons/lessons.js"),
         ),
         {**_COLONY, "ANT_WASM": "ant.wasm"},

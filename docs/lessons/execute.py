@@ -10,7 +10,9 @@ a description of its picture in its metadata, as `alt`. Pages that play are not 
 large, and web hosts do not show them.
 
 The edition for students has no results, and its answers are folded. The edition for teachers has
-all results, and its answers are open.
+all results, its answers are open, and it has notes, which are saved in the metadata of questions as
+`teachers`. Both editions are also a page, docs/lessons.html, which lab/build.py makes from the
+notebooks (see page/text.py).
 """
 
 from __future__ import annotations
@@ -96,6 +98,7 @@ def for_students(path: Path) -> Any:
         if cell.cell_type == "code":
             cell.outputs, cell.execution_count = [], None
         cells.append(cell)
+        cell.metadata.pop("teachers", None)
         if "yours" in cell.metadata.get("tags", ()):
             answer = folded("Answer", [cell])
             start = cell.source.index(YOURS) + len(YOURS)
@@ -125,13 +128,19 @@ def folded(title: str, cells: list[Any]) -> str:
 
 
 def for_teachers(path: Path) -> Any:
-    """Return the notebook of a file with its results, and with all answers open."""
+    """Return the notebook of a file with its results and notes, and with all answers open."""
     import nbformat
 
     notebook = nbformat.read(path, as_version=4)
+    cells = []
     for cell in notebook.cells:
         cell.source = cell.source.replace("<details>", "<details open>")
         cell.metadata.pop("jp-MarkdownHeadingCollapsed", None)
+        cells.append(cell)
+        if note := cell.metadata.pop("teachers", None):
+            note = f"> **For teachers.** {note}"
+            cells.append(nbformat.v4.new_markdown_cell(note, id=f"{cell.id}-note"))
+    notebook.cells = cells
     return notebook
 
 

@@ -11,26 +11,23 @@ import { glyph } from "../page/mind.js";
 // @ts-ignore: build.py declares it before all modules
 const ANT = BINARIES.ANT_WASM;
 const RANGE = 10, FIRST_CELL = [-8, 0];       // of the paper's world: its size, and where ants start
-const W = 640, H = 250, LEFT = 44, TOP = 30;  // of a plot
+const MOST = 660, H = 230, LEFT = 38;         // of a plot, in CSS pixels: its greatest width, its height, the place for numbers
 const DASHES = ["", "7 4", "2 3", "11 3 2 3"], COLOURS = ["--accent", "--focus", "--soft", "--text"];
 
 const escaped = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;");
 const rowOf = (cells, tag) => `<tr>${cells.map((cell) => `<${tag}>${escaped(cell)}</${tag}>`).join("")}</tr>`;
 const tableOf = (head, rows) => `<div class="wide"><table>${head ? rowOf(head, "th") : ""}${rows.map((row) => rowOf(row, "td")).join("")}</table></div>`;
 
-/** Lines of a plot as a picture, with a legend in words, colours and dashes. */
+/** Lines of a plot as a picture as wide as the page allows, with a legend in words, colours and dashes. */
 function plotOf(lines, across) {
-  const all = lines.flatMap(([, values]) => [...values]), high = Math.max(...all), low = Math.min(0, ...all), digits = high - low < 2 ? 1 : 0;
-  const y = (value) => H - 20 - (value - low) / (high - low || 1) * (H - 20 - TOP), x = (k, n) => LEFT + k / (n - 1) * (W - LEFT - 8);
-  const scale = [low, (low + high) / 2, high].map((value) => `<path d="M${LEFT},${y(value)}H${W}" stroke="var(--line)"/><text x="${LEFT - 6}" y="${y(value) + 4}" text-anchor="end">${value.toFixed(digits)}</text>`);
-  let right = LEFT;
-  const drawn = lines.map(([name, values], k) => {
-    const at = right, path = [...values].map((value, j) => `${j ? "L" : "M"}${x(j, values.length).toFixed(1)},${y(value).toFixed(1)}`).join("");
-    right += 44 + 7 * name.length;
-    const style = `stroke="var(${COLOURS[k]})" stroke-width="2" stroke-dasharray="${DASHES[k]}" fill="none"`;
-    return `<path d="${path}" ${style}/><path d="M${at},12h24" ${style}/><text x="${at + 29}" y="16">${escaped(name)}</text>`;
-  });
-  return `<svg class="plot" viewBox="0 0 ${W} ${H}" role="img" aria-label="${escaped(across)}">${scale.join("")}${drawn.join("")}<text x="${W}" y="${H - 4}" text-anchor="end">${escaped(across)}</text></svg>`;
+  const W = Math.min(MOST, innerWidth - 40), all = lines.flatMap(([, values]) => [...values]), high = Math.max(...all), low = Math.min(0, ...all);
+  const y = (value) => H - 8 - (value - low) / (high - low || 1) * (H - 22), x = (k, n) => LEFT + k / (n - 1) * (W - LEFT - 8);
+  const scale = [low, (low + high) / 2, high].map((value) => `<path d="M${LEFT},${y(value)}H${W}" stroke="var(--line)"/>`
+    + `<text x="${LEFT - 6}" y="${y(value) + 4}" text-anchor="end">${value.toFixed(high - low < 2 ? 1 : 0)}</text>`);
+  const style = (k) => `stroke="var(${COLOURS[k]})" stroke-width="2" stroke-dasharray="${DASHES[k]}" fill="none"`;
+  const drawn = lines.map(([, values], k) => `<path d="${[...values].map((value, j) => `${j ? "L" : "M"}${x(j, values.length).toFixed(1)},${y(value).toFixed(1)}`).join("")}" ${style(k)}/>`);
+  const legend = lines.map(([name], k) => `<span><svg width="28" height="6" aria-hidden="true"><path d="M0,3h28" ${style(k)}/></svg> ${escaped(name)}</span>`);
+  return `<div class="plot"><p>${legend.join("")}</p><svg width="${W}" height="${H}" role="img" aria-label="${escaped(across)}">${scale.join("")}${drawn.join("")}</svg><p>${escaped(across)}</p></div>`;
 }
 
 /** The recorded steps of lone ants: a map, a slider, and what happened in a step. */
@@ -47,7 +44,8 @@ class Walk {
     const names = walks.length > 1 ? `<select aria-label="Ant">${walks.map(([name]) => `<option>${escaped(name)}</option>`).join("")}</select>` : "";
     place.innerHTML = `<div class="walk"><svg viewBox="-15.5 -17.5 31 35" role="img" aria-label="The paper's world, with an ant">${cells.join("")}`
       + `<g class="ant"><path d="M0,-1.1L.7,.9L0,.5L-.7,.9Z"/></g></svg><div>${names}<p class="steps"><button aria-label="A step back">‹</button>`
-      + `<input type="range" min="0" aria-label="Step"><button aria-label="A step forward">›</button></p><div class="tells" aria-live="polite"></div></div></div>`;
+      + `<input type="range" min="0" aria-label="Step"><button aria-label="A step forward">›</button></p><div class="tells" aria-live="polite"></div>`
+      + '<p class="aside">At the top is food, at the bottom the queen, and outlined between them the trail. The stronger the colour of a cell, the more often the ant is there.</p></div></div>';
     [this.place, this.walks, this.bar] = [place, walks, place.querySelector("input")];
     const [back, on] = place.querySelectorAll("button"), pick = place.querySelector("select");
     this.bar.addEventListener("input", () => this.show());
@@ -93,8 +91,8 @@ class Walk {
 class Place {
   constructor(element, page) {
     [this.element, this.page, this.experiment] = [element, page, EXPERIMENTS[element.dataset.run]];
-    const { code, answer, now, label = code ? "Check" : "Run" } = this.experiment;
-    element.innerHTML = (code ? `<textarea class="code" spellcheck="false" autocapitalize="off" aria-label="Your function" rows="${code.split("\n").length + 2}">${escaped(code)}</textarea>` : "")
+    const { ask, code, answer, now, label = code ? "Check" : "Run" } = this.experiment;
+    element.innerHTML = (ask ? `<p>${ask}</p>` : "") + (code ? `<textarea class="code" spellcheck="false" autocapitalize="off" aria-label="Your function" rows="${code.split("\n").length + 2}">${escaped(code)}</textarea>` : "")
       + `<p class="acts"><button class="seeds">${label}</button></p><div class="result" aria-live="polite"></div>`
       + (code ? `<details><summary>Answer</summary><pre>${escaped(answer)}</pre></details>` : "");
     [this.button, this.result] = [element.querySelector("button"), element.querySelector(".result")];

@@ -62,8 +62,9 @@ class Launch:
             self(values)
 
     def _launch(self) -> None:
-        if self._for_gpu:
-            # A launch on a GPU replaces the pointers in its context by those of copies.
+        if self._renews:
+            # A launch on a GPU replaces the pointers in its context by those of copies, and on a
+            # CPU those of `ti.ndarray`.
             self._context = self._new_context()
             for name, place in self._places.items():
                 _pass(self._context, place, self._known[name])
@@ -72,10 +73,11 @@ class Launch:
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
         """Compile the kernel and make its pack, as Taichi does at a launch."""
-        self._for_gpu = runtime.compiles_for_gpu()
-        if self._for_gpu:
+        for_gpu = runtime.compiles_for_gpu()
+        self._renews = for_gpu or any(isinstance(value, ti.Ndarray) for value in values.values())
+        if for_gpu:
             values = {**values, _ZERO: 0}
-        kind = _pack_type(tuple((name, *_kind(value)) for name, value in values.items()))
+        kind = _pack_type(tuple((name, *kind_of(value)) for name, value in values.items()))
         taichi = ti.lang.impl.get_runtime()
         program, kernel = taichi.prog, self._kernel_of(kind)._primal
         # `kind(**values)` would make two packs.
@@ -84,7 +86,7 @@ class Launch:
         finalize(pack, _delete, ref(taichi), memory).atexit = False
         config = program.config()
         try:
-            guards = guarded(0, pack.places[-2]) if self._for_gpu else nullcontext()
+            guards = guarded(0, pack.places[-2]) if for_gpu else nullcontext()
             with runtime.quiet(), guards:
                 lowered = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
                 compiled = program.compile_kernel(config, program.get_device_caps(), lowered)
@@ -113,7 +115,7 @@ class Launch:
         known = self._pack[name]
         if known is not value and (isinstance(value, _ARRAYS) or known != value):
             self._pack[name] = value
-        if isinstance(value, _ARRAYS) and not self._for_gpu:
+        if isinstance(value, _ARRAYS) and not self._renews:
             _pass(self._context, self._places[name], value)
         self._known[name] = value
 
@@ -125,7 +127,7 @@ def has_guards(arguments: Any) -> bool:
 
 def on_device(array: np.ndarray) -> Any:
     """Return a copy of an array that stays in the memory of the device between launches."""
-    copy = ti.ndarray(getattr(ti, _kind(array)[0]), array.shape)
+    copy = ti.ndarray(getattr(ti, kind_of(array)[0]), array.shape)
     copy.taichi = ref(ti.lang.impl.get_runtime())
     with runtime.quiet():
         copy.from_numpy(array)
@@ -137,7 +139,7 @@ def check_not_lost(values: Iterable[Any]) -> None:
     running = ti.lang.impl.get_runtime()
     if any(getattr(value, "taichi", lambda: running)() is not running for value in values):
         raise AntsError(
-            "Taichi was reset, which destroys the state of environments on a GPU; create them again."
+            "Taichi was reset, which destroys environments on a GPU; create them again."
         )
 
 
@@ -196,7 +198,7 @@ def _delete(taichi: ref, memory: Any) -> None:
         program.delete_argpack(memory)
 
 
-def _kind(value: Any) -> tuple[str, int]:
+def kind_of(value: Any) -> tuple[str, int]:
     """Return the name of a Taichi type, and the number of dimensions, 0 for a number."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype.kind}{8 * value.dtype.itemsize}", value.ndim

@@ -327,7 +327,8 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
             best = q_values >= q_values.max(axis=1, keepdims=True)
             streams = stream_state(drawn, STREAM_ROLLOUT, np.arange(n))
             choices = best @ (1 << np.arange(N_ACTIONS)), streams, epsilon
-        finals = np.empty(shape, np.int32)
+        # Rows that kernels do not write are short, because a GPU copies them nevertheless.
+        finals = np.empty((length, n if ants.mode is AutoresetMode.SAME_STEP else 1), np.int32)
         into.observations[0] = ants.shown.show(ants.batched.arrays["states"])
         rows = {
             "taken": into.actions,

@@ -87,7 +87,8 @@ def test_run_afresh_it_says_the_same(path, kernels, monkeypatch):
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_both_editions_come_from_one_notebook(path, tmp_path):
-    """Students get every question and no result; their answers are folded. Teachers get it all."""
+    """Students get every question and no result; their answers are folded. Teachers get it all,
+    and for each question a note."""
     executor().write_editions(path, tmp_path)
     students, teachers = (
         cells_of(tmp_path / edition / path.name) for edition in ("students", "teachers")
@@ -103,6 +104,8 @@ def test_both_editions_come_from_one_notebook(path, tmp_path):
         return "\n\n".join(cell["source"] for cell in cells)
 
     assert "<details>" not in texts(teachers)
+    assert texts(teachers).count("> **For teachers.** ") == texts(saved).count("**Question")
+    assert "teachers" not in json.dumps([cell["metadata"] for cell in students])
     start = texts(students).index("## Solutions")
     solutions = texts(students)[start:]
     for cell in saved[[cell["source"] for cell in saved].index("## Solutions") :]:

@@ -1,7 +1,9 @@
 """Kernels as they are compiled and launched for a GPU, on the CPU: guards, and equal results."""
 
 import os
+import pickle
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +12,8 @@ import numpy as np
 import pytest
 
 import taichi_ants
-from taichi_ants import evaluate, learners, runtime, train, worlds
+from taichi_ants import AntsError, evaluate, learners, runtime, train, worlds
+from taichi_ants.envs.forage import HexForageVectorEnv
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 
@@ -101,12 +104,14 @@ for guards, equal in (nullcontext(), False), (guarded(3), True):
 
 def test_divisors_are_guarded_against_a_compiler_that_multiplies_by_reciprocals(tmp_path):
     # As that of a CPU does only with fast_math.
-    script = tmp_path / "quotients.py"  # Taichi reads the source of kernels
-    script.write_text(UNLIKE, encoding="utf-8")
-    options = {"TI_ADVANCED_OPTIMIZATION": "1", "PYTHONPATH": str(PACKAGE.parent)}
-    done = subprocess.run(
-        [sys.executable, script], env={**os.environ, **options}, capture_output=True, text=True
-    )
+    run_script(UNLIKE, tmp_path, TI_ADVANCED_OPTIMIZATION="1")
+
+
+def run_script(text, folder, **variables):
+    script = folder / "script.py"  # Taichi reads the source of kernels
+    script.write_text(text, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent), **variables}
+    done = subprocess.run([sys.executable, script], env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
 
@@ -126,6 +131,92 @@ def assert_same(left, right):
         np.testing.assert_array_equal(value, right[name], err_msg=name)
 
 
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_environments_are_the_same_as_on_a_gpu(mode, monkeypatch):
+    task = Task().replace(noise={"slip": 0.1, "misread": 0.1}, pheromone={"deposit": "fading"})
+    made = {}
+    for on_gpu in (False, True):
+        monkeypatch.setattr(runtime, "gpu_kernels_on_cpu", on_gpu)
+        envs = HexForageVectorEnv(600, task=task, max_steps=60, autoreset_mode=mode)
+        envs.reset(seed=4)
+        steps = [envs.step(np.full(600, action))[:4] for action in (1, 0, 1, 2, 1)]
+        followed = envs.rollout("trail_follower", 130, epsilon=0.3)
+        given = envs.rollout(np.random.default_rng(1).integers(5, size=(70, 600)))
+        copied = pickle.loads(pickle.dumps(envs))
+        now, later = (one._ants.batched.snapshot(7) for one in (envs, copied))
+        last = envs.step(np.full(600, 1))[:4]
+        made[on_gpu] = [*sum(steps, ()), *followed, *given, now.ground, now.trail, later.trail]
+        made[on_gpu] += last
+    for number, (ours, theirs) in enumerate(zip(made[False], made[True], strict=True)):
+        np.testing.assert_array_equal(ours, theirs, err_msg=str(number))
+
+
+def test_environments_on_a_gpu_end_with_a_reset_of_taichi(as_on_gpu):
+    envs = HexForageVectorEnv(2)
+    envs.reset(seed=1)
+    envs._ants.batched._cells_on_gpu.taichi = lambda: None  # as if it were of another runtime
+    with pytest.raises(AntsError, match="Taichi was reset, which destroys environments"):
+        pickle.dumps(envs)
+
+
+FOR_CUDA = """
+import os
+import numpy as np, taichi as ti
+from taichi_ants import learners, runtime, train, worlds
+from taichi_ants.envs.forage import HexForageVectorEnv
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task import Task
+
+runtime.start(arch="cuda")
+numbers = ti.types.ndarray(ti.f32, 1)
+
+@ti.kernel
+def unguarded(x: numbers):
+    for i in x:
+        x[i] = x[i] * x[i + 1] + x[i] / x[i + 2]
+
+unguarded(np.ones(9, np.float32))
+os.mkdir(guarded := os.environ["PTX_FOLDER"] + "/guarded")
+os.environ["PTX_FOLDER"] = guarded
+
+for name in learners.names():
+    train(worlds.paper(), TrainingConfig(name, 0.1, 0.9, 0.1, 0.9), 1, 2, 9)
+softmax = Task().replace(choice="softmax")
+train(worlds.paper(), TrainingConfig("sarsa", 0.1, 0.9, 0.1, 0.9), 1, 2, 9, softmax)
+envs = HexForageVectorEnv(3, task=Task().replace(noise={"slip": 0.1, "misread": 0.1}))
+envs.reset(seed=1)
+envs.step(np.ones(3, int))
+envs.rollout("random", 5)
+envs.rollout(np.ones((5, 3), int))
+"""
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+def test_compiled_for_a_gpu_no_product_is_fused_and_no_quotient_approximated(tmp_path):
+    driver = Path(__file__).parents[1] / "support" / "fake_cuda.c"
+    library = tmp_path / "libcuda.so"
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, driver], check=True)
+    folders = {"PTX_FOLDER": tmp_path, "LD_LIBRARY_PATH": tmp_path, "XDG_CACHE_HOME": tmp_path}
+    run_script(FOR_CUDA, tmp_path, **folders)
+    assert {"div.approx", "fma.rn"} <= changed_arithmetic(tmp_path / "1.ptx")
+    files = [*(tmp_path / "guarded").glob("*.ptx")]
+    assert len(files) > 12
+    for path in files:
+        assert not changed_arithmetic(path), path
+
+
+def changed_arithmetic(path):
+    """Return the operations in a file of PTX that a CPU does not have, or that a GPU may fuse."""
+    changed = set()
+    for kernel in path.read_text(encoding="utf-8").split(".visible .entry "):
+        changed.update(re.findall(r"fma\.rn|div\.(?:approx|full)|rcp\.\w+", kernel))
+        products = re.findall(r"\bmul\.(?:\w+\.)*f(?:32|64)\s+(%\w+)", kernel)
+        for of_sum in re.findall(r"\b(?:add|sub)\.(?:\w+\.)*f(?:32|64)\s+[^;]*", kernel):
+            if not set(products).isdisjoint(re.findall(r"%\w+", of_sum)[1:]):
+                changed.add(of_sum)
+    return changed
+
+
 def test_all_kernels_have_guards_on_a_gpu():
     plain = {}
     for path in PACKAGE.rglob("*.py"):
@@ -136,6 +227,7 @@ def test_all_kernels_have_guards_on_a_gpu():
         if unguarded:
             plain[path.relative_to(PACKAGE).as_posix()] = unguarded
     assert plain == {
+        "engines/colony/memory.py": 2,  # copies
         "engines/learner_check.py": 2,  # `testing` checks rules and learners on the CPU
         "engines/own_rules.py": 1,
         "rendering/raster_kernels.py": 2,  # colours, rounded to whole numbers

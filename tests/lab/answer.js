@@ -56,6 +56,12 @@ const ANSWERS = {
     const { returns, steps, deliveries } = new LoneAnts(ant).train(setting);
     return { returns: [...returns], steps: [...steps], deliveries: [...deliveries] };
   },
+  // The steps of an ant that learns, its table, and its steps when it then follows the table.
+  notes: ({ setting, rollout }) => {
+    const lone = new LoneAnts(ant), learned = (lone.train({ ...setting, notes: 3000 }), { table: [...lone.values], steps: lone.notes });
+    lone.follow(learned.table, { seeds: setting.seeds, rollout, notes: 600 });
+    return { ...learned, followed: lone.notes };
+  },
 };
 for await (const line of createInterface({ input: process.stdin })) {
   const [name, question] = JSON.parse(line);

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from lab_engines import ENGINE, Node
 
-from taichi_ants import TrainingConfig, train, worlds
+from taichi_ants import TrainingConfig, rollout, trace_training, train, worlds
 from taichi_ants.task import Task
 
 SEEDS = [1, 7, 2**40 + 3]
@@ -36,6 +36,26 @@ def test_runs_are_those_of_train(ask):
     assert len(grid) == 128
     delivered = [check(ask, setting, episodes=60, maxSteps=200) for setting in grid[5::32]]
     assert all(delivered)
+
+
+@pytest.mark.parametrize("learner", ["q_learning", "sarsa"])
+def test_notes_of_steps_are_those_of_the_package(learner, ask):
+    config = TrainingConfig(learner, 0.1, 0.9, 0.3, epsilon_decay=0.99)
+    setting = {"learner": learner, "rate": 0.1, "discount": 0.9, "epsilon": 0.3, "decay": 0.99}
+    found = ask("notes", setting={**setting, "seeds": [1], "episodes": 4}, rollout=2)
+    task = Task(evaporation_in_evaluation=False)
+    trace = trace_training(worlds.paper(), config, seed=1, episodes=4, task=task)
+    table = trace.tables[-1]
+    assert found["table"] == table.ravel().tolist()
+    followed = rollout(worlds.paper(), table, seed=1, number=2, task=task)
+    names = {"state": "states", "action": "actions", "reward": "rewards", "next": "next_states"}
+    for notes, wanted in ((found["steps"], trace), (found["followed"], followed)):
+        assert len(notes) == len(wanted) > 30
+        for name, column in names.items():
+            assert [note[name] for note in notes] == getattr(wanted, column).tolist()
+    entries = trace.tables[np.arange(len(trace)), trace.states, trace.actions]
+    assert [note["value"] for note in found["steps"]] == entries.tolist()
+    assert [bool(note["terminated"]) for note in found["steps"]] == trace.terminated.tolist()
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ NAMELESS = """[...document.querySelectorAll("button, input, select, canvas")].fi
 ).map((one) => one.outerHTML)"""
 
 
-@pytest.mark.parametrize("name", ["lab.html", "article.html"])
+@pytest.mark.parametrize("name", ["lab.html", "article.html", "lessons.html"])
 def test_the_committed_page_is_built_from_the_modules(name):
     spec = importlib.util.spec_from_file_location("build_lab", ROOT / "lab" / "build.py")
     build = importlib.util.module_from_spec(spec)

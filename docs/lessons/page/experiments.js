@@ -4,7 +4,7 @@
 
 import { hexDistance, LETTERS } from "../../../lab/page/engine.js";
 import { live, PLAN } from "./room.js";
-import { Random } from "../../../lab/lessons/random.js";
+import { Random } from "./random.js";
 
 export const ACTS = ["left", "forward", "right", "pick up", "deliver"];
 const CUE = 2, CARRIES = 64; // the code of a trail or of a way home; the first observation with food
@@ -16,7 +16,7 @@ const FAR = { ...LEARNER, learner: "dyna_q", discount: 0.99, planningSteps: 5 };
 const T95 = { 4: 2.7764, 9: 2.2622, 19: 2.093, 39: 2.0227, 49: 2.0096, 99: 1.9842, 199: 1.972, 499: 1.9647 }; // Student's t, by degrees of freedom
 
 export const viewOf = (state) => [state >> 4 & 3, state >> 2 & 3, state & 3];
-export const nameOf = (state) => `${state >= CARRIES ? "carrying" : "foraging"} ${viewOf(state).map((code) => LETTERS[state >> 6][code]).join(" ")}`;
+export const nameOf = (state) => `${state >= CARRIES ? "carrying" : "foraging"} ${viewOf(state).map((code) => LETTERS[state >> 6][code]).join("\u00a0")}`;
 const upTo = (n) => Array.from({ length: n }, (_, k) => k);
 const sum = (values) => values.reduce((a, b) => a + b, 0), mean = (values) => sum(values) / values.length;
 const percent = (share, digits = 0) => `${(100 * share).toFixed(digits)} %`;
@@ -119,7 +119,8 @@ function visits({ epsilon = 0, initial = 0, size = 0, change = -1 }) {
 }
 const tens = (values) => upTo(values.length / 10).map((k) => mean(values.slice(10 * k, 10 * k + 10)));
 const CHOOSE = `function choose(row, epsilon, random) {
-  // row has five numbers; random() gives a number from 0 to 1. Return an action, 0 to 4.
+  // row has five numbers; random() gives a number from 0 to 1.
+  // Return an action, 0 to 4.
   return 0;
 }`;
 const CHOSEN = `function choose(row, epsilon, random) {
@@ -152,7 +153,7 @@ function practice(lone, initial, epsilon) {
   const seeds = upTo(20), { deliveries } = lone.train({ ...LEARNER, epsilon, decay: 1, first: initial, seeds, episodes: 200 });
   const tables = lone.values, tried = upTo(10).map((rollout) => lone.follow(tables, { seeds, rollout }));
   return [percent(mean(seeds.map((k) => mean(deliveries.subarray(200 * k + 150, 200 * k + 200))))), percent(mean(tried.map((one) => mean(one.deliveries)))),
-          mean(tried.map(({ steps }) => mean(steps))).toFixed(1)];
+          mean(tried.map(({ steps }) => mean(steps))).toFixed(2)];
 }
 
 // Lessons 2 and 5 --------------------------------------------------------------------------------
@@ -217,11 +218,12 @@ export const SETTINGS = {
 
 /**
  * @typedef {{ say?: string, head?: string[], rows?: any[][], lines?: [string, ArrayLike<number>][], across?: string, walks?: [string, any[]][], at?: number, views?: any[] }} Outcome
- * @typedef {{ label?: string, now?: boolean, code?: string, answer?: string, name?: string, go: (given: { lone: any, own: any, show: (outcome: Outcome) => void }) => Outcome | Promise<Outcome> }} Experiment
+ * @typedef {{ ask?: string, label?: string, now?: boolean, code?: string, answer?: string, name?: string, go: (given: { lone: any, own: any, show: (outcome: Outcome) => void }) => Outcome | Promise<Outcome> }} Experiment
  * @type {Record<string, Experiment>}
  */
 export const EXPERIMENTS = {
   updated: {
+    ask: "Write the update:",
     name: "updated", code: "function updated(estimate, reward, n) {\n  // Return the estimate after the n-th visit.\n  return 0;\n}",
     answer: "function updated(estimate, reward, n) {\n  return estimate + (reward - estimate) / n;\n}",
     go({ own }) {
@@ -269,7 +271,7 @@ export const EXPERIMENTS = {
       return { head: ["20 ants", "deliver in the last 50 episodes", "deliver afterwards, ε = 0", "in steps"], rows };
     },
   },
-  choose: { name: "choose", code: CHOOSE, answer: CHOSEN, go: ({ own }) => checkChoice(own) },
+  choose: { ask: "Write epsilon-greedy choice between five actions (or five places):", name: "choose", code: CHOOSE, answer: CHOSEN, go: ({ own }) => checkChoice(own) },
   sees: {
     now: true,
     go({ lone }) {
@@ -280,7 +282,7 @@ export const EXPERIMENTS = {
   observations: {
     go() {
       const names = upTo(128).map(nameOf), number = (name, letter) => name.split(letter).length - 1;
-      const possible = (name) => number(name, "Q") + Math.sign(number(name, "S")) <= 1 && !/ S . S$/.test(name);
+      const possible = (name) => number(name, "Q") + Math.sign(number(name, "S")) <= 1 && !/\sS\s.\sS$/.test(name);
       const rows = [["have a number", names.length], ["can occur", names.filter(possible).length], ...[8, 66, 98, 108].map((k) => [`observation ${k}: ${names[k]}`, possible(names[k]) ? "can occur" : "cannot occur"])];
       return { head: ["observations", ""], rows };
     },
@@ -298,9 +300,10 @@ export const EXPERIMENTS = {
     },
   },
   sweep: {
+    ask: "Write a sweep:",
     name: "sweep", code: `function sweep(values, discount, options) {
-  // values has 35 numbers; return 35 new ones. options(s) lists the actions of state s,
-  // each as [reward, next state]; state 34 is the end and keeps the value 0.
+  // values has 35 numbers; return 35 new ones. options(s) lists the actions
+  // of state s, each as [reward, next state]. State 34 is the end, with value 0.
   return values;
 }`,
     answer: `function sweep(values, discount, options) {
@@ -339,6 +342,7 @@ export const EXPERIMENTS = {
     },
   },
   q_learning: {
+    ask: "Write the update. The two tables are compared after each step:",
     name: "qLearning", code: `function qLearning(q, s, a, r, sNext, terminated, alpha, gamma) {
   // q[s] is the row of observation s, with five entries. Change q[s][a].
 }`,
@@ -351,6 +355,7 @@ export const EXPERIMENTS = {
     go: ({ lone, own }) => checkUpdate(own, updates(lone, "q_learning")),
   },
   sarsa: {
+    ask: "Exercise 1 as a program: write SARSA’s update. It is compared with the C engine after each step.",
     name: "sarsa", code: `function sarsa(q, s, a, r, sNext, terminated, alpha, gamma, aNext) {
   // aNext is the action that the ant takes next. Change q[s][a].
 }`,
@@ -373,11 +378,12 @@ export const EXPERIMENTS = {
       const table = learned(lone), often = new Map();
       for (const { state } of lone.notes) often.set(state, (often.get(state) || 0) + 1);
       const states = [...often.keys()].sort((a, b) => often.get(b) - often.get(a)).slice(0, 24).sort((a, b) => a - b);
-      return { say: "The 24 observations that the ant has met most often in 500 episodes, with its best action:",
+      return { say: "The 24 observations that the ant has met most often in 500 episodes, with its best action. The bars are its five entries: left, forward, right, pick up, deliver.",
                views: states.map((state) => ({ state, values: [...table.slice(5 * state, 5 * state + 5)] })) };
     },
   },
   plan: {
+    ask: "Write the planning steps:",
     name: "plan", ...PLAN,
     go({ own }) {
       let step = 0;
@@ -434,6 +440,7 @@ export const EXPERIMENTS = {
   who: { go: ({ lone, show }) => behaviours(lone, show, [false]) },
   truncates: { go: ({ lone, show }) => behaviours(lone, show, [false, true]) },
   shaping: {
+    ask: "Exercise 2 as a program: pay for coming nearer to the queen. Your function is tried on the walks of ants A and C, step by step.",
     name: "pay", code: `function pay(before, after) {
   // The distances from the queen before and after a step with food. Return points.
   return after < before ? 1 : 0; // as in this lesson
@@ -464,6 +471,7 @@ export const EXPERIMENTS = {
     },
   },
   intervals: {
+    ask: "Write the test of an interval. The experiment uses it 16 000 times:",
     name: "contains", code: "function contains(low, high, truth) {\n  // Return true if the interval from low to high contains the truth.\n}",
     answer: "function contains(low, high, truth) {\n  return low <= truth && truth <= high;\n}",
     go({ lone, own }) {

@@ -1,6 +1,6 @@
 /* room.js: the room of lesson 4, in which ants know their state, and Dyna-Q; equal to the notebook, number by number. */
 
-import { Random } from "../../../lab/lessons/random.js";
+import { Random } from "./random.js";
 
 const ROOM = { width: 9, height: 6, start: 5 * 9 + 2, food: 8, change: 1500 };
 const AROUND = [[1, 0], [1, -1], [0, -1], [-1, 0], [-1, 1], [0, 1]];
@@ -9,8 +9,9 @@ const WALLS = { right: [0, 8], left: [1, 9], both: [1, 8] }; // columns with roc
 
 export const PLAN = {
   code: `function plan(q, model, n, draw) {
-  // model lists what was stored: { s, a, r, next, over }. draw(k) gives a random whole
-  // number below k. Learn from n stored steps, with step size 0.5 and discount 0.95.
+  // model lists what was stored: { s, a, r, next, over }; q[s] is a row.
+  // draw(k) gives a random whole number below k.
+  // Learn from n stored steps, with step size 0.5 and discount 0.95.
 }`,
   answer: `function plan(q, model, n, draw) {
   for (let k = 0; k < n; k++) {

@@ -1,9 +1,10 @@
-"""The text of the lessons' page, from the notebooks in docs/lessons.
+"""The text of docs/lessons.html, from the notebooks in docs/lessons; lab/build.py calls `lessons`.
 
 The notebooks are the only source of the lessons. In the metadata of a cell, `page` names what the
-page has in its place: pieces of lab/lessons/experiments.js, `world:NAME` for a world of the
-article, `recorded` for the saved result, or `none`. A code cell without `page` is left out. The
-metadata `teachers` is a note that only the teachers' edition shows.
+page has in its place: experiments of experiments.js, `world:NAME` for a world of the article,
+`recorded` for the saved result, `drawn` for one that is a drawing, or `none`. A code cell without
+`page` is left out, except in solutions, whose results are shown. The metadata `teachers` is a note
+that only the teachers' edition shows.
 """
 
 from __future__ import annotations
@@ -23,13 +24,18 @@ _MATH = (
     (r"\\(?:big|,)", " "),
     (r"\\leftarrow", "←"),
     (r"\\dots", "…"),
-    *((rf"\\{name}(?![a-z])", letter) for name, letter in zip(("alpha", "gamma", "delta"), "αγδ")),
+    *((r"\\alpha", "α"), (r"\\gamma", "γ"), (r"\\delta", "δ")),
     (r"\\max", "max"),
 )
 _WORDS = (
+    (r"\[([^\]]+)\]\([^)]+\.md\)", r"\1"),  # the page is alone
     (r"\[([^\]]+)\]\((?:\.\./)?([^)]+)\)", r'<a href="\2">\1</a>'),
     (r"\*\*(.+?)\*\*", r"<b>\1</b>"),
     (r"\*(\S|\S.*?\S)\*", r"<i>\1</i>"),
+)
+_EXERCISES = (
+    "<h2>Exercises</h2>",
+    '<h2>Exercises</h2><p class="aside">Do them on paper, in the notebook, or in fields below.</p>',
 )
 _LIST = re.compile(r"^(?:- |\d\. )", re.M)
 
@@ -60,7 +66,8 @@ def block(text: str) -> str:
     if text.startswith("|"):
         rows = [line.strip("| ").split("|") for line in text.split("\n")]
         cells = ["".join(f"<td>{inline(cell.strip())}</td>" for cell in row) for row in rows]
-        return f"<table>{''.join(f'<tr>{row}</tr>' for row in [cells[0], *cells[2:]])}</table>"
+        head = cells[0].replace("td>", "th>")
+        return f"<table>{''.join(f'<tr>{row}</tr>' for row in [head, *cells[2:]])}</table>"
     if _LIST.match(text):
         kind = "ul" if text[0] == "-" else "ol"
         items = "".join(f"<li>{inline(item.strip())}</li>" for item in _LIST.split(text)[1:])
@@ -76,22 +83,19 @@ def markdown(text: str) -> str:
     return "\n".join(block(part) for part in blocks if not part.startswith("*Using this notebook"))
 
 
-def recorded(cell: dict[str, Any]) -> str:
+def recorded(cell: dict[str, Any], kind: str = "recorded") -> str:
     """Return the saved result of a cell: its text, and for a picture its description."""
-    texts = [
-        f"<pre>{html.escape(''.join(out['text']))}</pre>"
-        for out in cell["outputs"]
-        if "text" in out
-    ]
-    if "alt" in cell["metadata"]:
-        texts.append(f"<p>{inline(cell['metadata']['alt'])}</p>")
-    return f'<div class="recorded">{"".join(texts)}</div>' if texts else ""
+    texts = ["".join(out["text"]) for out in cell["outputs"] if "text" in out]
+    parts = [f"<pre>{html.escape(text, quote=False)}</pre>" for text in texts]
+    if alt := cell["metadata"].get("alt"):
+        parts.append(f"<p>The picture: {inline(alt)}</p>")
+    return f'<div class="{kind}">{"".join(parts)}</div>' if parts else ""
 
 
 def piece(name: str, cell: dict[str, Any]) -> str:
-    """Return the place of a piece, which the page fills."""
-    if name == "recorded":
-        return recorded(cell)
+    """Return the place of a piece, which the page fills, or a saved result."""
+    if name in ("recorded", "drawn"):
+        return recorded(cell, name)
     if name.startswith("world:"):
         return f'<figure data-piece="{name[6:]}"></figure>'
     return f'<div class="piece" data-run="{name}"></div>'
@@ -122,7 +126,7 @@ def lesson(path: Path) -> str:
             )
             solutions += 1
         else:
-            parts.append(markdown(source))
+            parts.append(markdown(source).replace(*_EXERCISES))
         if note := metadata.get("teachers"):
             parts.append(f'<aside class="teachers"><b>For teachers.</b> {inline(note)}</aside>')
         parts += [piece(name, cell) for name in names]

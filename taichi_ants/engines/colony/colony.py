@@ -49,7 +49,12 @@ class Colony(TickingColony):
             for sharing "frozen" with a `training`.
         threads, arch: As in `train`.
         schedule: "by_world" distributes worlds to threads, "by_chunk" groups of ants; None chooses
-            by size. Both give the same numbers, with ants stored in different orders.
+            by size. "by_ant" is that of a GPU, which has no other: each ant, cell or state has its
+            own thread, and the state is on the device while ticks run. All give the same numbers,
+            with ants stored in different orders.
+
+    With the schedule "by_ant", read attributes again after each `tick`: arrays that you read before
+    have old values, and what you write into them is lost. Ctrl-C within `tick` ends the episode.
 
     Raises:
         AntsError: An argument is not allowed, the learner does not work in a colony or with a

@@ -27,7 +27,9 @@ def function(body: Callable[..., Any]) -> Callable[..., Any]:
 def chunks_of(c, v):
     """Return the number of chunks of each world in a launch."""
     n = 1
-    if ti.static(v.in_chunks):
+    if ti.static(v.by_ant):
+        n = c.places
+    elif ti.static(v.in_chunks):
         n = c.orders[Order.CHUNKS]
     return n
 

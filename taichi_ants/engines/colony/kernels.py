@@ -2,24 +2,36 @@
 
 If worlds are many and small, each world is one part of the work. If they are few and large, all
 threads share each phase by chunks, which are ranges of the ants, cells or states of one world, and
-wait for each other at a barrier. Both do the same phases in the same order and give the same
-numbers. The order is that of `taichi_ants.reference.ReferenceColony.tick`.
+wait for each other at a barrier. On a GPU, each ant, cell or state has a thread, and a phase is a
+parallel loop. All do the same phases in the same order and give the same numbers. The order is that
+of `taichi_ants.reference.ReferenceColony.tick`.
 """
 
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import taichi as ti
 from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
-from taichi_ants.engines.colony import columns, layout, learning, life, own_inputs, steps, trail
+from taichi_ants.engines.colony import (
+    columns,
+    layout,
+    learning,
+    life,
+    memory,
+    own_inputs,
+    steps,
+    trail,
+)
 from taichi_ants.engines.colony.barrier import next_group, part_of, share_of_part
 from taichi_ants.engines.colony.columns import chunks_of, function, share_of
 from taichi_ants.engines.colony.layout import Order, WorldRow
 from taichi_ants.engines.colony.views import entries_of
 from taichi_ants.features import hooks_at
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
@@ -47,12 +59,17 @@ Group = tuple[Phase, ...]
 class Variant:
     """A model with the functions and types of its kernels; `v` in functions.
 
-    `in_chunks` says whether threads share worlds; else each world is one chunk.
+    `in_chunks` says whether threads share worlds; else each world is one chunk. With `by_ant`,
+    each ant can have a thread, and chunks only spread sums, to which threads add atomically.
     """
 
-    def __init__(self, model: Model, in_chunks: bool) -> None:
+    def __init__(self, model: Model, schedule: str) -> None:
         vars(self).update(vars(model))
-        self.in_chunks = in_chunks
+        self.in_chunks, self.by_ant = schedule != "by_world", schedule == layout.BY_ANT
+        self.add_to_sums, self.note_transition = learning.add_to_sums, learning.note_transition
+        if self.by_ant:
+            self.add_to_sums = learning.add_atomically
+            self.note_transition = learning.note_atomically
         # The mark of an ant that wants no other cell.
         self.mark_of_rest = STANDS if model.traffic.shared else 0
         # The hooks of features at each point, in their order.
@@ -195,6 +212,74 @@ def once(v: Variant, what: Callable[..., None], arguments: Any) -> Callable[...,
         ti.loop_config(block_dim=1)
         for chunk in range(c.n_worlds * chunks_of(c, v)):
             do(phase, c, v, chunk)
+
+    return advance_colony
+
+
+@function
+def do_one(phase, c, v, i):
+    """Do a phase for entry i of what all worlds have: an ant, cell or state; or for world i."""
+    w = i
+    if ti.static(phase.of == ANTS):
+        w = i // c.n_slots
+    elif ti.static(phase.of == CELLS):
+        w = i // c.size
+    elif ti.static(phase.of == STATES):
+        w = i // v.n_rows
+    running, tick = c.worlds[WorldRow.RUNNING, w], c.worlds[WorldRow.TICKS, w]
+    if ti.static(phase.of == STATES):
+        phase.do(c, v, w, i - w * v.n_rows, i - w * v.n_rows + 1)
+    elif ti.static(phase.of == ANTS):
+        slot = i - w * c.n_slots
+        if running == 1 and slot < c.worlds[WorldRow.TOP, w]:
+            if is_taken(c, v, i):
+                phase.do(c, v, w, w * c.places + slot % c.places, i, tick)
+    elif running == 1:
+        if ti.static(phase.of == CELLS):
+            phase.do(c, v, i, tick)
+        else:
+            phase.do(c, v, w, tick)
+
+
+ONCE = {"begin": learning.begin, "see_interventions": learning.see_interventions}
+
+
+def launches_of_tick(v: Variant, planning_steps: int) -> list[str]:
+    """Return the names for `by_ant` of the kernels of a tick."""
+    return ["first", *["planning"] * planning_steps, "last"] if v.plans_together else ["tick"]
+
+
+@cache
+def by_ant(v: Variant, name: str, contents: memory.Contents, arguments: Any) -> Callable[..., None]:
+    """Return a kernel with a parallel loop for each phase, or for several of a group."""
+    groups: list[Group] = [(Phase(ANTS, ONCE[name]),)] if name in ONCE else []
+    if name in ("tick", "first"):
+        groups += tick_groups(v)
+    if name == "planning":
+        groups += planning_groups(v)
+    if name in ("tick", "last"):
+        groups += last_groups(v)
+    loops = tuple(
+        (of, tuple(phases))
+        for group in groups
+        for of, phases in groupby(group, lambda phase: phase.of)
+    )
+
+    @while_compiling
+    def length_of(of: str, numbers: Any) -> Any:
+        number = partial(memory.number_of, contents, numbers)
+        each = {ANTS: "n_slots", CELLS: "size"}
+        in_world = number(each[of]) if of in each else v.n_rows if of == STATES else 1
+        return number("n_worlds") * in_world
+
+    @ti.kernel
+    def advance_colony(c: arguments):
+        for of, phases in ti.static(loops):
+            ti.loop_config(block_dim=128)
+            for i in range(length_of(of, c)):
+                colony = memory.view_of(contents, c)
+                for phase in ti.static(phases):
+                    do_one(phase, colony, v, i)
 
     return advance_colony
 

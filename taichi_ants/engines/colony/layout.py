@@ -176,6 +176,9 @@ class SumRow(IntEnum):
 ANT_STANDS = 7
 ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food
 
+BY_ANT = "by_ant"  # the schedule of a GPU
+SCHEDULES = "by_world", "by_chunk", BY_ANT
+PLACES = 64  # of sums in a world, so that few ants add to the same place at once
 # The number of slots from which threads share a world: a single world, and each of many.
 _LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
 SORTED_BITS = 16  # of the number of a cell, by which ants are sorted
@@ -189,17 +192,18 @@ def array_of(number: int, dense: bool) -> str:
     return f"field_{number}" if number else "level" if dense else "trail"
 
 
-def schedule_of(given: str | None, n_worlds: int, capacity: int) -> str:
-    """Return a schedule, by default the faster one."""
+def schedule_of(given: str | None, n_worlds: int, capacity: int, arch: str) -> str:
+    """Return a schedule, by default the faster one; AntsError if it is not for the processor."""
     large = capacity >= (_LARGE_ALONE if n_worlds == 1 else _LARGE_COLONY)
-    schedule = ("by_chunk" if large else "by_world") if given is None else given
-    check_one_of("schedule", schedule, ("by_world", "by_chunk"))
+    fastest = BY_ANT if arch == "cuda" else "by_chunk" if large else "by_world"
+    schedule = fastest if given is None else given
+    check_one_of("schedule", schedule, SCHEDULES if arch == "cpu" else (BY_ANT,))
     return schedule
 
 
-def most_chunks(n_worlds: int, capacity: int, pairs: int, threads: int) -> int:
+def most_chunks(n_worlds: int, capacity: int, pairs: int, most: int) -> int:
     """Return the most chunks of a world, if each has sums for some pairs of state and action."""
-    return max(1, min(threads, capacity, _MOST_SUMS // max(1, n_worlds * pairs)))
+    return max(1, min(most, capacity, _MOST_SUMS // max(1, n_worlds * pairs)))
 
 
 def chunks_for(parts: int, n_worlds: int, most: int) -> int:

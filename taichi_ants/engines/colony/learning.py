@@ -5,10 +5,10 @@ tick. The n errors of a pair are summed as 64-bit fixed-point numbers, so that t
 matter. The value moves by weights[n] times their mean, as n successive updates towards one target
 would move it.
 
-Each chunk of ants has its own sums, without atomic operations. If a world is one chunk, `touched`
-lists the pairs with updates: their number, then the pairs. Else `touched` marks the states with
-updates, and chunks share the states: each joins the sums of its states into those of the world,
-which come before those of chunks, and applies them.
+Each chunk of ants has its own sums, without atomic operations, unless `v.by_ant`. If a world is one
+chunk, `touched` lists the pairs with updates: their number, then the pairs. Else `touched` marks
+the states with updates, and chunks share the states: each joins the sums of its states into those
+of the world, which come before those of chunks, and applies them.
 """
 
 import taichi as ti
@@ -88,7 +88,7 @@ def observe_and_learn(c, v, w, chunk, ant, tick):
         c.reward[ant] = 0
         if acts:
             c.reward[ant] = steps.own_reward(c, v, w, ant, paper_state, tick)
-            steps.tally(c, Tally.RETURNS, chunk, c.reward[ant])
+            steps.tally(c, v, Tally.RETURNS, chunk, c.reward[ant])
     if acts & learns(c, v, ant):
         if ti.static(v.draws_next_action):
             if terminates(columns.trait(c.event, ant), c.delivery_terminates) == 0:
@@ -253,10 +253,10 @@ def share_error(c, v, w, chunk, ant, seen, next_action):
     pair = steps.state_index_of(c, v, ant) * ROW + columns.trait(c.action, ant)
     pair += columns.group_of(c, v, ant) * v.n_numbers
     error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
-    entry = add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
+    entry = v.add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
     if ti.static(v.learner.plans):
         transition = model.pack_transition(seen, reward, terminated)
-        note_transition(c, entry, c.number[ant], transition)
+        v.note_transition(c, entry, c.number[ant], transition)
 
 
 @ti.func
@@ -314,6 +314,28 @@ def note_transition(c, entry, number, transition):
 
 
 @function
+def add_atomically(c, v, chunk, pair, error, total, count):
+    """Do the same as `add_to_sums` if many threads process a chunk: of any ant is the last error.
+
+    It is only used for a single one.
+    """
+    sums = sums_of_chunk(c, v, chunk)
+    entry = v.n_pairs * sums + pair
+    c.touched[touched_of(v, sums) + pair // ROW] = 1
+    c.sums_of[SumRow.COUNT, entry] += count
+    c.sums[entry] += total
+    c.errors[entry] = error
+    return entry
+
+
+@function
+def note_atomically(c, entry, number, transition):
+    """Do the same as `note_transition` if many threads process a chunk, in `latest`."""
+    words = ti.cast(number, ti.i64) << 32 | ti.cast(ti.cast(transition, ti.u32), ti.i64)
+    ti.atomic_max(c.latest[entry], words)
+
+
+@function
 def join_sums(c, v, w, first, last):
     """Join the sums of all chunks of a world in a range of states, and reset them."""
     if ti.static(v.in_chunks):
@@ -344,6 +366,10 @@ def join_pair(c, v, entry, joined, found):
                 c.sums_of[SumRow.LATEST, entry],
                 c.sums_of[SumRow.TRANSITION, entry],
             )
+            if ti.static(v.by_ant):
+                latest = ti.cast(c.latest[entry] >> 32, ti.i32)
+                transition = ti.cast(c.latest[entry], ti.i32)
+                c.latest[entry] = 0
             note_transition(c, joined, latest, transition)
         c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
 
@@ -444,8 +470,8 @@ def draw_pair(c, v, w, chunk, ant, tick):
         drawn, c.streams[ant] = draw_below(c.streams[ant], model.visited(memory, at))
         pair, transition = model.recall(memory, at, drawn)
         pair += columns.group_of(c, v, ant) * v.n_numbers
-        entry = add_to_sums(c, v, chunk, pair, 0.0, ti.cast(0, ti.i64), 1)
-        note_transition(c, entry, 0, transition)
+        entry = v.add_to_sums(c, v, chunk, pair, 0.0, ti.cast(0, ti.i64), 1)
+        v.note_transition(c, entry, 0, transition)
 
 
 @function

@@ -164,7 +164,7 @@ def grow_old(c, v, w, chunk, ant, tick):
             dies = dies | aged(ant_view(c, v, w, ant))
         if dies:
             put(c.stage, ant, Stage.DYING)
-            tally(c, Tally.DEATHS, chunk, 1)
+            tally(c, v, Tally.DEATHS, chunk, 1)
             left_behind = ti.select(trait(c.carries, ant) == 1, FOOD, EMPTY)
             index = w * c.size + c.cell[ant]
             c.ground[index] = ti.cast(left_behind, ti.u8)

@@ -17,7 +17,7 @@ from taichi_ants.engines.colony.columns import chunks_of, function, share_of
 from taichi_ants.engines.colony.layout import COLUMNS, SORTED_BITS, Order
 
 _N_DIGITS = 1 << SORTED_BITS // 2
-_VARIANT = SimpleNamespace(in_chunks=True)  # see `kernels.Variant`
+_VARIANT = SimpleNamespace(in_chunks=True, by_ant=False)  # see `kernels.Variant`
 _TYPES = {"i1": (ti.i8, ti.u8, 8), "i4": (ti.i32, ti.u32, 32), "f4": (ti.f32, ti.u32, 32)}
 _TYPES["u8"] = ti.u64, ti.u64, 64
 

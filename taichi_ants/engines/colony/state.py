@@ -19,8 +19,10 @@ from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     BARRIER_SIZE,
+    BY_ANT,
     COLUMNS,
     NESTS_BY_KINDS,
+    PLACES,
     SORTED_BITS,
     TALLY_WIDTH,
     TOTALS,
@@ -72,6 +74,15 @@ _KIND = Kind("colony", 14, "Colony.save", sealed=True)
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
+
+
+def _no_arrays(schedule: str) -> Any:
+    """Return an empty dictionary for arrays; for a GPU, they will be on the device."""
+    if schedule != BY_ANT:
+        return {}
+    from taichi_ants.engines.colony.device import DeviceArrays  # imports Taichi
+
+    return DeviceArrays()
 
 
 def _view_of(array: Array) -> property:
@@ -149,8 +160,7 @@ class ColonyState:
         table = None if q_values is None else checked_values(q_values, task)
         self.seeds = arguments.checked_seeds(seeds)
         running = runtime.start(threads, arch)
-        runtime.check_on_cpu(running, "colonies run")
-        self.schedule = schedule_of(schedule, len(self.seeds), self.capacity)
+        self.schedule = schedule_of(schedule, len(self.seeds), self.capacity, running.arch)
         self.n_nests = 0
         worlds = self._checked_worlds(world)
         self.n_nests, shape = worlds[0].n_nests, () if table is None else table.shape
@@ -165,10 +175,11 @@ class ColonyState:
         # The states of all tables that ants of a world share, and the most chunks of a world.
         self._shared_rows = model.n_rows if sharing == "shared" else 0
         self.chunks = 1
-        if self.schedule == "by_chunk":
-            sizes = len(self.seeds), self.capacity, self._shared_rows * ROW, running.threads
+        if self.schedule != "by_world":
+            places = PLACES if self.schedule == BY_ANT else running.threads
+            sizes = len(self.seeds), self.capacity, self._shared_rows * ROW, places
             self.chunks = most_chunks(*sizes)
-        self.arrays: Arrays = {}
+        self.arrays = _no_arrays(self.schedule)
         self._lay_out(worlds)
         self.arrays |= (lasting := self._lasting(table))
         self.stored = (*self._changing, *lasting)
@@ -593,9 +604,10 @@ class ColonyState:
         """Return constants of worlds and settings, and scratch arrays of a tick."""
         n_worlds, rows, touched = len(self.seeds), self._shared_rows, self._shared_rows * ROW + 1
         chunks = sums = n_worlds * self.chunks
-        if self.schedule == "by_chunk":
+        if self.schedule != "by_world":
             sums, touched = n_worlds + chunks, TOUCHED_LINE * -(-rows // TOUCHED_LINE)
         pairs, cells = max(1, sums * rows * ROW), n_worlds * self.grid.size
+        by_ant, plans = self.schedule == BY_ANT, self._model.plans_together
         return {
             **self._ground_constants(),
             "compass": compass_of(self.grid),  # see `rules.actions`
@@ -622,6 +634,7 @@ class ColonyState:
             "errors": np.zeros(pairs, np.float32),
             "sums_of": np.zeros((len(SumRow), pairs), np.int32),
             "touched": np.zeros(max(1, sums * touched), np.int32),
+            **dict.fromkeys(["latest"] * by_ant, np.zeros(pairs if plans else 1, np.int64)),
         }
 
     def _settings(self) -> Arrays:
@@ -704,11 +717,13 @@ class ColonyState:
 
         AntsError if the file cannot be used, or its learner or observation is not registered.
         """
-        runtime.start(threads, arch)  # first, because its errors are not about the file
+        running = runtime.start(threads, arch)  # first: its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):
             training = facts["training"] and TrainingConfig(**facts["training"])
             worlds = [World.from_dict(world) for world in facts["worlds"]]
             task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
+            if (options["schedule"] == BY_ANT) != (running.arch == "cuda"):
+                options["schedule"] = None  # of another processor
             if options["sharing"] == "frozen" and training is not None:
                 # Tables of the right shape, which the arrays of the file replace.
                 leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import arguments, runtime
-from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, WorldRow, chunks_for
+from taichi_ants.engines.colony.layout import BY_ANT, GAVE_UP, Barrier, Order, WorldRow, chunks_for
 from taichi_ants.engines.colony.state import ALL, ColonyState, Which
 from taichi_ants.errors import AntsError, as_array, checked_whole, count, entries_of, shown
 from taichi_ants.grid.randomness import words_of
@@ -85,7 +85,7 @@ class TickingColony(ColonyState):
 
     _piece = 1  # a number of ticks that takes less than _PIECE_SECONDS
     _sort_seconds = 0.0  # spent on sorting by NumPy
-    _launches = cached_property[dict[str, Any]](lambda colony: {})  # prepared kernels, by name
+    _launches = cached_property[dict[Any, Any]](lambda colony: {})  # prepared kernels, by name
     _choice = cached_property(lambda colony: ThreadChoice())
 
     def begin_episode(
@@ -103,7 +103,7 @@ class TickingColony(ColonyState):
         fresh = copy.copy(self)
         fresh.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
         if world is not None:  # which may have too little room
-            fresh.arrays = {**self.arrays}
+            fresh.arrays = copy.copy(self.arrays)
             fresh._lay_out(self._checked_worlds(world))
         self.ready[:] = False  # also after Ctrl-C before the end
         self._count_deliveries()
@@ -160,13 +160,13 @@ class TickingColony(ColonyState):
 
     def _observe(self, worlds: Sequence[int]) -> None:
         """Let the ants of some worlds observe again, after interventions in these worlds."""
-        row = self.arrays["worlds"][WorldRow.RUNNING]
-        running = row.copy()
-        row[np.setdiff1d(np.arange(len(row)), worlds)] = 0  # ants that misread draw numbers
+        running = self.arrays["worlds"][WorldRow.RUNNING].copy()
+        others = np.setdiff1d(np.arange(len(running)), worlds)
+        self.arrays["worlds"][WorldRow.RUNNING, others] = 0  # ants that misread draw numbers
         try:
             self._launch("see_interventions")
         finally:
-            row[:] = running
+            self.arrays["worlds"][WorldRow.RUNNING] = running
 
     def tick(self, n: int = 1) -> None:
         """Advance by n ticks, except worlds whose episode has ended."""
@@ -223,6 +223,9 @@ class TickingColony(ColonyState):
 
     def _advance(self, n: int) -> None:
         """Advance the colony by n ticks."""
+        if self.schedule == BY_ANT:
+            self._advance_by_ant(n)
+            return
         end = self.ticks + n
         n_worlds, running = len(self.seeds), runtime.start().threads
         if self.schedule == "by_world":
@@ -242,6 +245,31 @@ class TickingColony(ColonyState):
             if compiled:
                 self._choice.note(piece, threads, time.perf_counter() - began)
 
+    def _advance_by_ant(self, n: int) -> None:
+        """Advance by n ticks of one or several launches each."""
+        from taichi_ants.engines.colony import kernels
+
+        names = kernels.launches_of_tick(self._variant, self.training.planning_steps)
+        ready, self.ready = self.ready, np.zeros_like(self.ready)  # in case of Ctrl-C
+        self._launch_by_ant(names * n)
+        self.ticks += n
+        self.ready = ready
+
+    def _launch_by_ant(self, names: Sequence[str]) -> None:
+        """Launch kernels by name, with a thread for each ant, and wait for the device."""
+        import taichi as ti
+
+        from taichi_ants.engines.colony import kernels
+        from taichi_ants.engines.launch import Launch
+
+        contents, memories = self.arrays.on_device(kernel_numbers(self) | {"places": self.chunks})
+        for name in names:
+            if (name, contents) not in self._launches:
+                kernel_of = partial(kernels.by_ant, self._variant, name, contents)
+                self._launches[name, contents] = Launch(kernel_of)
+            self._launches[name, contents](memories)
+        ti.sync()
+
     def _sort(self, parts: int) -> None:
         """Sort the ants: in a kernel, once NumPy has taken the time that the kernel costs."""
         if self._sort_seconds >= _SORT_SECONDS:
@@ -253,8 +281,11 @@ class TickingColony(ColonyState):
 
     def _launch(self, name: str) -> None:
         """Launch a kernel by name: "ticks", "sort", or what ants do once, see `learning`."""
+        if self.schedule == BY_ANT:
+            self._launch_by_ant([name])
+            return
         # The caller may have reset Taichi, or forked the process.
-        runtime.check_on_cpu(runtime.start(), "colonies run")
+        runtime.check_on_cpu(runtime.start(), f"the schedule {self.schedule!r} runs")
         if name not in self._launches:
             from taichi_ants.engines.launch import Launch
 
@@ -272,10 +303,15 @@ class TickingColony(ColonyState):
 
         if name == "sort":
             return partial(sorting.sort, self._columns())
-        variant = kernels.variant(self._model, self.schedule == "by_chunk")
         if name == "ticks":
-            return partial(kernels.ticks, variant)
-        return partial(kernels.once, variant, getattr(learning, name))
+            return partial(kernels.ticks, self._variant)
+        return partial(kernels.once, self._variant, getattr(learning, name))
+
+    @property
+    def _variant(self) -> Any:
+        from taichi_ants.engines.colony import kernels
+
+        return kernels.variant(self._model, self.schedule)
 
     @cached_property
     def _scratch(self) -> dict[str, np.ndarray]:

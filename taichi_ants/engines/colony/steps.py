@@ -545,11 +545,11 @@ def act(c, v, w, chunk, ant, tick):
                     index = base + goes
                     deposit(c, v, first, w, ant, index, tick, carried, carries, event, paper_state)
         elif actions.can_give(action, paper_state):
-            tally(c, Tally.CARRIED, chunk, carried)
+            tally(c, v, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
             put(c.carries, ant, 0)
             put(c.heading, ant, actions.heading_after_delivery(heading, c.turns_at_queen))
-            tally(c, Tally.DELIVERIES, chunk, 1)
+            tally(c, v, Tally.DELIVERIES, chunk, 1)
             count_apart(c, v, ant, chunk)
             for gave in ti.static(v.at["gave"]):
                 gave(ant_view(c, v, w, ant))
@@ -587,10 +587,10 @@ def act(c, v, w, chunk, ant, tick):
     for rests in ti.static(v.at["rests"]):
         event = ti.select(rests(ant_view(c, v, w, ant)) == 1, ti.cast(Event.NONE, ti.i32), event)
     put(c.event, ant, event)
-    tally(c, Tally.MOVES, chunk, moves)
-    tally(c, Tally.BLOCKED, chunk, moves & (1 - enters))
+    tally(c, v, Tally.MOVES, chunk, moves)
+    tally(c, v, Tally.BLOCKED, chunk, moves & (1 - enters))
     if ti.static(not v.has_own_reward):
-        tally(c, Tally.RETURNS, chunk, reward_of(c, v, ant))
+        tally(c, v, Tally.RETURNS, chunk, reward_of(c, v, ant))
 
 
 @cache
@@ -632,9 +632,12 @@ def lays(c, v, ant, number: ti.template()):
 
 
 @function
-def tally(c, state, chunk, n):
-    """Add n to a tally of a chunk, which one thread processes; `+=` would be atomic and slower."""
-    c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n
+def tally(c, v, state, chunk, n):
+    """Add n to a tally of a chunk, which one thread processes unless `v.by_ant`."""
+    if ti.static(v.by_ant):
+        c.tallies[chunk * TALLY_WIDTH + state] += n
+    else:  # without `+=`, which would be atomic and slower
+        c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n
 
 
 @function
@@ -644,10 +647,16 @@ def count_apart(c, v, ant, chunk):
         column = chunk * layout.NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
         if ti.static(v.n_kinds > 1):
             column += trait(c.kind, ant)
-        c.delivered[column] = c.delivered[column] + 1
+        if ti.static(v.by_ant):
+            c.delivered[column] += 1
+        else:
+            c.delivered[column] = c.delivered[column] + 1
     if ti.static(v.n_castes > 0):
         column = chunk * constants.MAX_CASTES + trait(c.caste, ant)
-        c.delivered_by_caste[column] = c.delivered_by_caste[column] + 1
+        if ti.static(v.by_ant):
+            c.delivered_by_caste[column] += 1
+        else:
+            c.delivered_by_caste[column] = c.delivered_by_caste[column] + 1
 
 
 @function

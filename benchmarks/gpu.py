@@ -1,0 +1,200 @@
+"""Compare the results of a GPU with those of a CPU, and measure its speed.
+
+Results are those of trainings, environments and colonies with each feature of the model. Those of
+trainings and colonies have hashes recorded on a CPU, in tests/golden. Speeds are those of a second
+call, by the wall clock. The most telling parts come first; after `--seconds`, the command leaves
+out the others, and says so. It prints each line when it has it, then tables.
+
+Without a GPU, `--on-cpu` compares the results of kernels for a GPU, which run on the CPU.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+
+import numpy as np
+from cores import COLONIES, Q_LEARNING, colony_of
+from measuring import PAGE, ROOT, a_ratio, machine, pace, publish
+
+from taichi_ants import AntsError, Task, runtime, train, worlds
+from taichi_ants.analysis.tables import Table, figure, plain_text
+from taichi_ants.envs.forage import HexForageVectorEnv
+from taichi_ants.studies.command_line import Parser, run_command
+
+os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "1")  # `record` would choose 0, to compile faster
+sys.path.insert(0, str(ROOT / "tests" / "golden"))
+import record  # type: ignore[import-not-found]
+
+_H200 = 4.8e12  # bytes/s, of the GPU for which goals are stated
+MANY = 65_536  # runs, or environments
+
+
+def card() -> tuple[str, float]:
+    """Return the name of the GPU, and bytes/s of its memory; AntsError without one."""
+    device, kilohertz, bits = ctypes.c_int(), ctypes.c_int(), ctypes.c_int()
+    try:
+        driver = ctypes.CDLL("libcuda.so")
+        status = driver.cuInit(0) or driver.cuDeviceGet(ctypes.byref(device), 0)
+    except OSError:
+        status = -1
+    if status:
+        raise AntsError("no CUDA device is usable here; --on-cpu compares results without one.")
+    name = ctypes.create_string_buffer(99)
+    driver.cuDeviceGetName(name, 99, device)
+    driver.cuDeviceGetAttribute(ctypes.byref(kilohertz), 36, device)
+    driver.cuDeviceGetAttribute(ctypes.byref(bits), 37, device)
+    return name.value.decode(), 2e3 * kilohertz.value * bits.value / 8
+
+
+def environments() -> str:
+    """Return the hash of steps and rollouts of environments."""
+    digest = record.Digest()
+    for mode in ("NextStep", "SameStep"):
+        task = Task().replace(noise={"slip": 0.1, "misread": 0.1}, pheromone={"deposit": "fading"})
+        env = HexForageVectorEnv(600, task=task, max_steps=60, autoreset_mode=mode)
+        env.reset(seed=4)
+        for action in (1, 0, 1, 2, 1):
+            digest.add(*env.step(np.full(600, action))[:4])
+        digest.add(*env.rollout("trail_follower", 130, epsilon=0.3))
+        digest.add(*env.rollout(np.random.default_rng(1).integers(5, size=(70, 600))))
+        digest.add(env._ants.batched.snapshot(7).trail)
+    return digest.text()
+
+
+def training(learner: str) -> Iterator[str]:
+    """Yield the hash of a training, and the one recorded."""
+    for name, made in record.drawing.random_trainings(learner, 1, learner in ("sarsa", "dyna_q")):
+        yield from (record.of_training(made), record.recorded()[1][name])
+
+
+def colony(group: str) -> Iterator[str]:
+    """Yield the hash of a colony, and the one recorded."""
+    for name, drawn in record.drawing.colonies_of(group, 1):
+        yield from (record.of_colony(drawn, "by_ant"), record.recorded()[1][name])
+
+
+def speed_of_colony(ants: int, n_worlds: int) -> float:
+    """Return million steps/s of ants that learn while they forage."""
+    alive = colony_of(ants, n_worlds)
+
+    def ticks() -> int:
+        alive.tick(64)
+        return 64 * ants * n_worlds
+
+    ticks()
+    return pace(ticks, 2.0)[0] / 1e6
+
+
+def speed_of_training() -> float:
+    """Return million steps/s of runs that learn by Q-learning in the paper's world."""
+    for _ in range(2):
+        done = train(worlds.paper(), Q_LEARNING, range(MANY), 30, task=Task(delivery="truncates"))
+    return float(done.steps.sum(dtype=np.int64) / done.seconds / 1e6)
+
+
+def speed_of_environments(rolls: bool) -> float:
+    """Return million steps/s of environments with random actions."""
+    env = HexForageVectorEnv(MANY, observation_format="index")
+    env.reset(seed=0)
+    actions = np.random.default_rng(0).integers(5, size=MANY)
+
+    def steps() -> int:
+        if rolls:
+            env.rollout("random", 64, epsilon=1.0)
+        else:
+            env.step(actions)
+        return (64 if rolls else 1) * MANY
+
+    steps()
+    return pace(steps, 2.0)[0] / 1e6
+
+
+# Their goals, or None.
+SPEEDS: dict[str, tuple[float | None, Callable[[], float]]] = {
+    "colony, 1 000 000 ants": (1500, partial(speed_of_colony, *COLONIES[0])),
+    "`train`, 65 536 runs": (3000, speed_of_training),
+    "`rollout`, 65 536 environments": (2000, partial(speed_of_environments, True)),
+    "colony, 100 000 ants": (400, partial(speed_of_colony, *COLONIES[1])),
+    "colony, 4 096 worlds of 64 ants": (1000, partial(speed_of_colony, *COLONIES[3])),
+    "colony, 10 000 ants": (None, partial(speed_of_colony, *COLONIES[2])),
+    "`step`, 65 536 environments": (None, partial(speed_of_environments, False)),
+}
+
+
+def cases(expected: str) -> dict[str, Callable[[], Iterator[str]]]:
+    """Return functions that yield a hash and that of a CPU; `expected` is that of environments."""
+    return {
+        "environments": lambda: iter((environments(), expected)),
+        **{f"training: {name}": partial(training, name) for name in record.TRAINED},
+        **{f"colony: {group}": partial(colony, group) for group in record.drawing.GROUPS},
+    }
+
+
+def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
+    """Return a table of results that are equal or not, and one of speeds."""
+    began, rows = time.perf_counter(), dict[str, list[str]]()
+    expected = environments() if word in "environments" else ""
+    about, measures = machine(("taichi", "numpy")), {} if on_cpu else SPEEDS
+    if on_cpu:
+        runtime.gpu_kernels_on_cpu = True
+    else:
+        name, bandwidth = card()
+        about = f"{name}, {figure(bandwidth / 1e12)} TB/s; {about}"
+        runtime.start(arch="cuda")
+    compared = {case: one for case, one in cases(expected).items() if word in case}
+    first = [case for case in ("training: q_learning", "colony: plain") if case in compared]
+    for case in (*first, *measures, *(case for case in compared if case not in first)):
+        try:
+            if time.perf_counter() - began > seconds:
+                rows[case] = [case, "left out"]
+            elif case in measures:
+                goal, measure = measures[case]
+                rows[case] = [case, figure(found := measure()), "", ""]
+                if goal:
+                    goal *= bandwidth / _H200
+                    rows[case][2:] = figure(goal), figure(found / goal)
+            else:
+                ours, theirs = compared[case]()
+                rows[case] = [case, "equal" if ours == theirs else "DIFFERENT"]
+        except Exception as error:  # the others are worth the time on a GPU
+            rows[case] = [case, f"FAILED: {error}"]
+        print(*rows[case], sep="  ", flush=True)
+    paces = [row for case, row in rows.items() if case in measures]
+    results = [row for case, row in rows.items() if case in compared]
+    columns = ["M steps/s", "measured", "goal", "share of it"]
+    return [
+        *([Table("Speed on a GPU", columns, paces)] if paces else []),
+        Table("Results, compared with a CPU's", ["case", ""], results, [about]),
+    ]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line."""
+    parser = Parser(__doc__)
+    add = parser.add_argument
+    add("--seconds", type=a_ratio, default=200.0, help="begin no part later")
+    add("--only", metavar="WORD", default="", help="compare results whose name has this word")
+    add("--on-cpu", action="store_true", help="run kernels for a GPU on the CPU")
+    add("--publish", action="store_true", help=f"write the tables to {PAGE.name}")
+
+    def command() -> None:
+        given = parser.parse_args(arguments)
+        if not given.on_cpu:
+            card()
+        tables = measured(given.seconds, given.on_cpu, given.only)
+        print(plain_text(tables, 120), end="")
+        if given.publish:
+            publish("gpu", tables, PAGE)
+        if any(row[1].startswith(("DIFFERENT", "FAILED")) for one in tables for row in one.rows):
+            raise AntsError("some parts failed, or differ from those of a CPU.")
+
+    run_command(command)
+
+
+if __name__ == "__main__":
+    main()

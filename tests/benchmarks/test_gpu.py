@@ -1,0 +1,51 @@
+"""The benchmark of a GPU, without one."""
+
+from __future__ import annotations
+
+import ctypes
+
+import gpu
+import pytest
+
+from taichi_ants import runtime
+
+
+@pytest.fixture(autouse=True)
+def on_cpu_afterwards(monkeypatch):
+    monkeypatch.setattr(runtime, "gpu_kernels_on_cpu", False)
+
+
+def run(*arguments, status=0):
+    with pytest.raises(SystemExit) as ended:
+        gpu.main(arguments)
+    assert ended.value.code == status
+
+
+@pytest.mark.parametrize("case", ["environments", "training: double_q"])
+def test_results_of_kernels_for_a_gpu_are_those_of_the_cpu(case, capsys):
+    run("--on-cpu", "--only", case)
+    assert f"{case}  equal\n" in capsys.readouterr().out
+
+
+def test_results_that_differ_are_an_error(monkeypatch, capsys):
+    monkeypatch.setattr(gpu.record, "recorded", lambda: (1, {"sarsa-0-noisy": "another"}))
+    run("--on-cpu", "--only", "training: sarsa", status=2)
+    printed = capsys.readouterr()
+    assert "training: sarsa  DIFFERENT\n" in printed.out
+    assert "training: sarsa_lambda  FAILED: 'sarsa_lambda-0'\n" in printed.out
+    assert printed.err == "error: some parts failed, or differ from those of a CPU.\n"
+
+
+def test_parts_are_left_out_after_some_time(capsys):
+    run("--on-cpu", "--only", "colony", "--seconds", "0")
+    assert capsys.readouterr().out.count("left out\n") == 2 * len(gpu.record.drawing.GROUPS)
+
+
+def test_without_a_gpu_it_says_so(monkeypatch, capsys):
+    def missing(name):
+        raise OSError(name)
+
+    monkeypatch.setattr(ctypes, "CDLL", missing)
+    run(status=2)
+    told = "error: no CUDA device is usable here; --on-cpu compares results without one.\n"
+    assert capsys.readouterr().err == told
