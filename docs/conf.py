@@ -90,8 +90,8 @@ def link_apps(app: Any, doctree: nodes.document) -> None:
 
 def mend_page(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
     """Give captions of the navigation their level, and let the keyboard scroll wide code."""
-    tree = context.get("furo_navigation_tree", "")
-    context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
+    tree, level = context.get("furo_navigation_tree", ""), 'role="heading" aria-level="2"'
+    context["furo_navigation_tree"] = tree.replace('role="heading"', level)
     if "body" in context:
         context["body"] = re.sub(r"<pre(?= id=|>)", '<pre tabindex="0"', context["body"])
 

@@ -1,4 +1,4 @@
-"""The project's words, as far as a machine judges them: names, spelling, and what must not be named."""
+"""The project's words, as far as a machine judges them: spelling, and what must not be named."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TERMS = {
     r"\b(Openai Gym|OpenAI Gym)\b": "Gymnasium",
     r"\bpolic(y|ies) written by hand\b": "hand-written policy",
     r"\b(Numpy|Scipy)\b": "NumPy, SciPy",
-    r"\b(behavior|neighbor|color scheme)\b(?![-_:=(.])": "British spelling: behaviour, neighbour, colour",
+    r"\b(behavior|neighbor|color scheme)\b(?![-_:=(.])": "British spelling: behaviour, neighbour",
     r"\b(pre-train|post-process)\w*": "train before, process after",
     r"\bfoods per\b": "food items per",
     r"\b(ticks|steps|frames) a second\b": "ticks/s",
