@@ -19,7 +19,7 @@ from functools import partial
 
 import numpy as np
 from cores import COLONIES, Q_LEARNING, colony_of
-from measuring import PAGE, ROOT, a_ratio, machine, pace, publish
+from measuring import ROOT, a_ratio, machine, pace, publish
 
 from taichi_ants import AntsError, Task, runtime, train, worlds
 from taichi_ants.analysis.tables import Table, figure, plain_text
@@ -90,8 +90,12 @@ def speed_of_colony(ants: int, n_worlds: int) -> float:
     return pace(ticks, 2.0)[0] / 1e6
 
 
-def speed_of_training() -> float:
+def speed_of_training(threads_of_block: int) -> float:
     """Return million steps/s of runs that learn by Q-learning in the paper's world."""
+    from taichi_ants.engines.runs import kernels
+
+    kernels.THREADS_OF_BLOCK = threads_of_block
+    kernels.run_kernel.cache_clear()
     for _ in range(2):
         done = train(worlds.paper(), Q_LEARNING, range(MANY), 30, task=Task(delivery="truncates"))
     return float(done.steps.sum(dtype=np.int64) / done.seconds / 1e6)
@@ -117,12 +121,14 @@ def speed_of_environments(rolls: bool) -> float:
 # Their goals, or None.
 SPEEDS: dict[str, tuple[float | None, Callable[[], float]]] = {
     "colony, 1 000 000 ants": (1500, partial(speed_of_colony, *COLONIES[0])),
-    "`train`, 65 536 runs": (3000, speed_of_training),
+    "`train`, 65 536 runs": (3000, partial(speed_of_training, 32)),
     "`rollout`, 65 536 environments": (2000, partial(speed_of_environments, True)),
     "colony, 100 000 ants": (400, partial(speed_of_colony, *COLONIES[1])),
     "colony, 4 096 worlds of 64 ants": (1000, partial(speed_of_colony, *COLONIES[3])),
     "colony, 10 000 ants": (None, partial(speed_of_colony, *COLONIES[2])),
     "`step`, 65 536 environments": (None, partial(speed_of_environments, False)),
+    "`train`, blocks of 1 thread": (None, partial(speed_of_training, 1)),
+    "`train`, blocks of 128 threads": (None, partial(speed_of_training, 128)),
 }
 
 
@@ -165,12 +171,19 @@ def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
             rows[case] = [case, f"FAILED: {error}"]
         print(*rows[case], sep="  ", flush=True)
     paces = [row for case, row in rows.items() if case in measures]
-    results = [row for case, row in rows.items() if case in compared]
+    results = [summary(kind, rows) for kind in ("environments", "training", "colony")]
     columns = ["M steps/s", "measured", "goal", "share of it"]
     return [
         *([Table("Speed on a GPU", columns, paces)] if paces else []),
-        Table("Results, compared with a CPU's", ["case", ""], results, [about]),
+        Table("Results", ["", "cases", "equal to a CPU's", "others"], results, [about]),
     ]
+
+
+def summary(kind: str, rows: dict[str, list[str]]) -> list[str]:
+    """Return the row of all cases of a kind: how many are equal, and the others."""
+    found = {case: row[1] for case, row in rows.items() if case.startswith(kind)}
+    others = [f"{case}: {result}" for case, result in found.items() if result != "equal"]
+    return [kind, str(len(found)), str(len(found) - len(others)), "; ".join(others)]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -180,7 +193,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add("--seconds", type=a_ratio, default=200.0, help="begin no part later")
     add("--only", metavar="WORD", default="", help="compare results whose name has this word")
     add("--on-cpu", action="store_true", help="run kernels for a GPU on the CPU")
-    add("--publish", action="store_true", help=f"write the tables to {PAGE.name}")
+    add("--publish", action="store_true", help="write the tables to docs/results/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)
@@ -189,8 +202,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         tables = measured(given.seconds, given.on_cpu, given.only)
         print(plain_text(tables, 120), end="")
         if given.publish:
-            publish("gpu", tables, PAGE)
-        if any(row[1].startswith(("DIFFERENT", "FAILED")) for one in tables for row in one.rows):
+            publish("performance_gpu", tables)
+        if any(word in str(tables) for word in ("DIFFERENT", "FAILED")):
             raise AntsError("some parts failed, or differ from those of a CPU.")
 
     run_command(command)

@@ -55,6 +55,7 @@ ARCHIVE = "tests/commands/test_archive.py"
 ODD = "tests/report/test_odd.py"
 NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
+ON_GPU = "tests/engines/test_gpu.py"
 LONE_NOISE = "tests/envs/test_noise.py"
 DESIGN = "tests/studies/test_design.py"
 FEATURES = "tests/test_features.py"
@@ -154,6 +155,14 @@ MUTATIONS = [
     ("task/rules/policy.py", "cumulative <= drawn", "cumulative < drawn / 2", CHOICE),
     ("task/rules/policy.py", "(is_open_at * is_nearer).sum() > 0", "False", COLONY),
     ("arithmetic/numbers.py", "if m > ti.f64(SQRT_2)", "if m > ti.f64(2.0)", NUMBERS),
+    ("arithmetic/guards.py", "result = mul(a, b)\n", "return mul(a, b)\n", ON_GPU),
+    ("arithmetic/guards.py", "hidden(divisor, next(uses))", "divisor", ON_GPU),
+    (
+        "engines/runs/rollout_kernel.py",
+        "record(a, t * a.n + i, code)",
+        "record(a, i, code)",
+        ON_GPU,
+    ),
     ("features/noise.py", "ti.cast(other >= code", "ti.cast(other > code", CHOICE),
     (
         "task/rules/vision.py",
@@ -212,12 +221,6 @@ MUTATIONS = [
     ("engines/colony/learning.py", "shape[0] - 1)]  #", "shape[0] - 2)]  #", COLONY),
     ("engines/colony/learning.py", "c.initial_q, 0.0)", "0.0, 0.0)", COLONY),
     ("engines/colony/learning.py", "if number > c.sums_of", "if number < c.sums_of", SCHEDULES),
-    (
-        "engines/colony/steps.py",
-        "c.tallies[chunk * TALLY_WIDTH + state] += n",
-        "c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n",
-        BY_ANT,
-    ),
     ("engines/colony/learning.py", "ti.atomic_max(c.latest", "ti.atomic_min(c.latest", BY_ANT),
     ("engines/colony/kernels.py", "if running == 1 and slot <", "if slot <", BY_ANT),
     ("engines/colony/device.py", "if numbers != self._numbers:", "if not self._numbers:", BY_ANT),

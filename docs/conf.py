@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -132,9 +133,18 @@ def write_sitemap(app: Any, error: Exception | None) -> None:
     )
 
 
+def copy_notebooks(app: Any, error: Exception | None) -> None:
+    """Copy the lessons as notebooks, to which lessons.html links."""
+    if error or app.builder.name != "html":
+        return
+    for path in (DOCS / "lessons").glob("*.ipynb"):
+        shutil.copy(path, Path(app.outdir) / "lessons")
+
+
 def setup(app: Any) -> None:
     app.connect("doctree-read", link_apps, priority=100)
     app.connect("html-page-context", mend_page, priority=900)  # after the theme
     app.connect("builder-inited", draw_card)
     app.connect("build-finished", write_sitemap)
+    app.connect("build-finished", copy_notebooks)
     app.add_html_math_renderer("mathml", (visit_math, None), (visit_math, None))

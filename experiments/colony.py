@@ -305,8 +305,8 @@ def tables(plan: Plan, runs: Runs) -> str:
         ("differences.csv", study.difference_rows(judged)),
     ):
         files.write_csv(folder / name, table, list(table[0]))
-    for name, table in (("glance", study.glance(rows)), ("elsewhere", study.means(rows)[-1])):
-        published.write(folder / "tables" / f"colony_{name}.json", [table])
+    for name, shown in (("glance", study.glance(rows)), ("elsewhere", study.means(rows)[-1])):
+        published.write(folder / "tables" / f"colony_{name}.json", [shown])
     policies = {}
     for condition, point in conditions.items():
         if condition.rules in COMPARED and condition.regime == JOINT:

@@ -255,13 +255,13 @@ def tables(plan: Plan, results: Results) -> str:
     links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
     facts |= made_facts(results.made)
     titles = "return", "steps", "late_steps"
-    for name, table in {
+    for name, one in {
         **dict(zip(titles, figure_tables(lines, comparison), strict=False)),
         "policies": behaviour_table(lines, summarise_behaviours(comparison)),
         "claims": headlines(audit, ON_PAGE),
         "verdicts": verdict_table(audit),
     }.items():
-        published.write(folder / "tables" / f"paper_{name}.json", [table])
+        published.write(folder / "tables" / f"paper_{name}.json", [one])
     html = page.comparison_page(comparison, baselines, lines, audit, shown, facts, links)
     files.write_text(folder / PAGE, html)
     return report(comparison, lines, audit)

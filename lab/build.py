@@ -1,8 +1,9 @@
 """Build the pages of the lab, each a single file in docs: python lab/build.py.
 
 The modules of a page are joined in the order given into one script: lines that import are dropped,
-and the word "export" is. So each module can also be imported as it is, by Node and by a type
-checker. Fonts and WebAssembly are embedded in base64; the pages need no network.
+and the word "export" is; imported JSON becomes a constant. So each module can also be imported as
+it is, by Node and by a type checker. Fonts and WebAssembly are embedded in base64; the pages need
+no network.
 """
 
 from __future__ import annotations
@@ -77,6 +78,7 @@ PAGES = {
 FONTS = LAB / "page" / "fonts"
 FACES = (("Newsreader", "500", "newsreader.woff2"), ("Inter", "400 650", "inter.woff2"))
 _IMPORT = re.compile(r"^import\b[^;]*;\n", re.M)
+_DATA = re.compile(r'^import (\w+) from "([^"]+)" with { type: "json" };$', re.M)
 # Names at the start of a line, also several in a row: const A = 1, B = 2;
 _NAMES = re.compile(r"^(?:async )?(?:const|let|function|class) ((?:\w+ = [^,(\[{\n]+, )*\w+)", re.M)
 
@@ -86,9 +88,15 @@ def base64_of(path: Path) -> str:
     return base64.b64encode(path.read_bytes()).decode()
 
 
+def with_data(path: Path) -> str:
+    """Return a module in which imported JSON is a constant."""
+    data = lambda found: f"const {found[1]} = {(path.parent / found[2]).read_text('utf-8')};"  # noqa: E731
+    return _DATA.sub(data, path.read_text("utf-8"))
+
+
 def script(modules: tuple[str, ...]) -> str:
     """Return the modules as one script; raise ValueError if two of them declare the same name."""
-    parts = [_IMPORT.sub("", (LAB / name).read_text("utf-8")) for name in modules]
+    parts = [_IMPORT.sub("", with_data(LAB / name)) for name in modules]
     text = re.sub(r"^export ", "", "\n".join(parts), flags=re.M)
     names = [re.sub(" = .*", "", one) for row in _NAMES.findall(text) for one in row.split(", ")]
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -126,15 +134,9 @@ def live_page() -> str:
     """Return the live page of the package with a worker in place of the server."""
     controls, style, _socket, *scripts = (part(name, "taichi_ants.live") for name in PARTS)
     worker = script((*(f"page/{name}.js" for name in _ENGINE), "live/worker.js"))
-    headers = (LAB / "live" / "headers.json").read_text("utf-8").strip()
-    constants = {
-        "WORKER": json.dumps(f"{worker}\nserve();"),
-        "COLONY": json.dumps(base64_of(LAB / "engine" / "colony.wasm")),
-        "HEADERS": headers,
-    }
-    lines = (f"const {name} = {text};" for name, text in constants.items())
-    transport = (LAB / "live" / "transport.js").read_text("utf-8")
-    scripts = [transport, *lines, *scripts]
+    texts = {"WORKER": f"{worker}\nserve();", "COLONY": base64_of(LAB / "engine" / "colony.wasm")}
+    lines = (f"const {name} = {json.dumps(text)};" for name, text in texts.items())
+    scripts = [(LAB / "live" / "transport.js").read_text("utf-8"), *lines, *scripts]
     whole = assemble("Taichi Ants, live", controls=controls, style=style, script="\n".join(scripts))
     # The worker is a part of the page, and compiles WebAssembly.
     return whole.replace("script-src '", "worker-src blob:; script-src 'wasm-unsafe-eval' '", 1)

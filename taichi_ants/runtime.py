@@ -94,10 +94,13 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
         return wanted
     if running is not None:
         ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
-        data = ti.Field, ti.Ndarray, ti.Texture  # which only the user's program creates
-        # There are half a million objects, but only a few thousand types.
-        kinds = {type(thing) for thing in gc.get_objects()}
-        if not ours or any(issubclass(kind, data) for kind in kinds):
+        # Those of the user's program, and of colonies and environments on a GPU.
+        data = ti.Field, ti.Ndarray, ti.Texture
+        has_data = _exists(data)
+        if has_data:
+            gc.collect()  # Taichi keeps arrays that kernels were compiled for in cycles
+            has_data = _exists(data)
+        if not ours or has_data:
             why = "has fields or arrays" if ours else "was not started by taichi_ants"
             raise AntsError(
                 f"arch={wanted.arch!r}, threads={wanted.threads} requires a restart of Taichi, but "
@@ -106,6 +109,13 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
             )
     _init(ti, wanted)
     return wanted
+
+
+def _exists(kinds: tuple[type, ...]) -> bool:
+    """Return whether an object of one of these types exists."""
+    # There are half a million objects, but only a few thousand types.
+    types = {type(thing) for thing in gc.get_objects()}
+    return any(issubclass(one, kinds) for one in types)
 
 
 def check_on_cpu(running: Runtime, what: str) -> None:

@@ -2,7 +2,8 @@
 
 The ants of a nest have different thresholds. The stimulus of the nest rises with its demand and
 falls with each delivery. An idle ant (a nurse) starts foraging more often if the stimulus is high
-and its threshold low. Foragers follow the hand-written policy. See docs/models/division_of_labour.md.
+and its threshold low. Foragers follow the hand-written policy. See
+docs/models/division_of_labour.md.
 """
 
 import model_script

@@ -1,7 +1,7 @@
 """Build colony.wasm and ant.wasm from C, with clang and lld: python lab/engine/build.py
 
-It also writes, from the package, the tables of lab/page/worlds.js (the worlds, and the best actions
-of the hand-written policy) and lab/live/headers.json (facts about the frames of each set of rules).
+It also writes what pages need from the package: lab/page/followers.json (the hand-written policy)
+and lab/live/headers.json (facts about the frames of each set of rules).
 
 The files are committed, with their checksums and the compiler in built.json, so that a page needs
 no compiler. Other compilers make other bytes with the same results, which tests compare.
@@ -20,11 +20,8 @@ from taichi_ants.lab import RULES, decoded, played
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.viewer.frames import SECTIONS
 from taichi_ants.viewer.recorder import Recorder
-from taichi_ants.worlds import lab
 
 ENGINE = Path(__file__).resolve().parent
-WORLDS = ENGINE.parent / "page" / "worlds.js"
-HEADERS = ENGINE.parent / "live" / "headers.json"
 CELLS = [name for name, kind in SECTIONS.items() if kind == "cell"]
 FIRST_SCREEN = "AQAPVUAeZIQHAQrYBAEC"  # its code
 SOURCES = {"colony.wasm": "page.c", "ant.wasm": "ant_page.c"}
@@ -49,17 +46,14 @@ def build(folder: Path = ENGINE, clang: str = "clang") -> dict[str, str]:
     return {"compiler": version.stdout.splitlines()[0], **built}
 
 
-def with_tables(script: str) -> str:
-    """Return worlds.js with the present tables of the package."""
-    begin, end = script.index("/* GENERATED */\n"), script.index("/* END */\n")
-    lines = [f"const LAB = {Path(lab.__file__).with_suffix('.json').read_text('utf-8').strip()};"]
-    # A letter for each state: its best actions are the bits of its place after "@".
-    lines.append("export const FOLLOWERS = {")
-    for observation in ("paper", "ants", "queues"):
-        rows = trail_follower(observation)
-        letters = "".join(chr(64 + sum(1 << int(a) for a in row.nonzero()[0])) for row in rows)
-        lines.append(f"  {len(rows)}: {json.dumps(letters)},")
-    return script[:begin] + "\n".join(["/* GENERATED */", *lines, "};", ""]) + script[end:]
+def followers() -> dict[int, str]:
+    """Return the best actions of the hand-written policy by number of states, a letter for each.
+
+    They are the bits of its place after "@".
+    """
+    tables = [trail_follower(observation) for observation in ("paper", "ants", "queues")]
+    best = [[sum(1 << int(a) for a in row.nonzero()[0]) for row in rows] for rows in tables]
+    return {len(bits): "".join(chr(64 + one) for one in bits) for bits in best}
 
 
 def headers() -> dict[str, Any]:
@@ -77,10 +71,13 @@ def headers() -> dict[str, Any]:
     return {"rules": rules, "names": names}
 
 
+DATA = {"page/followers.json": followers, "live/headers.json": headers}
+
 if __name__ == "__main__":
     facts = build(clang=sys.argv[1] if len(sys.argv) > 1 else "clang")
     (ENGINE / "built.json").write_text(json.dumps(facts, indent=2) + "\n")
-    HEADERS.write_text(json.dumps(headers(), separators=(",", ":")) + "\n", "utf-8")
-    WORLDS.write_text(with_tables(WORLDS.read_text("utf-8")), "utf-8")
+    for name, content in DATA.items():
+        text = json.dumps(content(), separators=(",", ":")) + "\n"
+        (ENGINE.parent / name).write_text(text, "utf-8")
     for name in SOURCES:
         print(f"{name}: {(ENGINE / name).stat().st_size} bytes")

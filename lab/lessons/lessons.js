@@ -32,6 +32,8 @@ function plotOf(lines, across) {
 
 /** The recorded steps of lone ants: a map, a slider, and what happened in a step. */
 class Walk {
+  place; walks; bar;
+
   constructor(place, walks, at = 0) {
     const hexagon = STEPS.map(([q, r]) => centre(q, r)).map(([x, y]) => `${(y / 1.82).toFixed(2)},${(x / 1.82).toFixed(2)}`).join(" ");
     const cells = [];
@@ -46,7 +48,9 @@ class Walk {
       + `<g class="ant"><path d="M0,-1.1L.7,.9L0,.5L-.7,.9Z"/></g></svg><div>${names}<p class="steps"><button aria-label="A step back">‹</button>`
       + `<input type="range" min="0" aria-label="Step"><button aria-label="A step forward">›</button></p><div class="tells" aria-live="polite"></div>`
       + '<p class="aside">At the top is food, at the bottom the queen, and outlined between them the trail. The stronger the colour of a cell, the more often the ant is there.</p></div></div>';
-    [this.place, this.walks, this.bar] = [place, walks, place.querySelector("input")];
+    this.place = place;
+    this.walks = walks;
+    this.bar = place.querySelector("input");
     const [back, on] = place.querySelectorAll("button"), pick = place.querySelector("select");
     this.bar.addEventListener("input", () => this.show());
     back.addEventListener("click", () => { this.bar.stepDown(); this.show(); });
@@ -89,13 +93,19 @@ class Walk {
 
 /** The place of an experiment: an editor if there is something to write, a button, and the result. */
 class Place {
+  element; page; experiment; button; result; group = null;
+
   constructor(element, page) {
-    [this.element, this.page, this.experiment] = [element, page, EXPERIMENTS[element.dataset.run]];
+    this.element = element;
+    this.page = page;
+    this.experiment = EXPERIMENTS[element.dataset.run];
+    this.group = null; // of a question, see Group
     const { ask, code, answer, now, label = code ? "Check" : "Run" } = this.experiment;
     element.innerHTML = (ask ? `<p>${ask}</p>` : "") + (code ? `<textarea class="code" spellcheck="false" autocapitalize="off" aria-label="Your function" rows="${code.split("\n").length + 2}">${escaped(code)}</textarea>` : "")
       + `<p class="acts"><button class="seeds">${label}</button></p><div class="result" aria-live="polite"></div>`
       + (code ? `<details><summary>Answer</summary><pre>${escaped(answer)}</pre></details>` : "");
-    [this.button, this.result] = [element.querySelector("button"), element.querySelector(".result")];
+    this.button = element.querySelector("button");
+    this.result = element.querySelector(".result");
     this.label = label;
     this.button.addEventListener("click", () => this.run());
     this.button.parentElement.hidden = Boolean(now);
@@ -118,6 +128,7 @@ class Place {
     this.group?.open();
   }
 
+  /** @param {import("../../docs/lessons/page/experiments.js").Outcome} outcome */
   show({ say, head, rows, lines, across, walks, at, views }) {
     const { look } = this.page;
     this.result.innerHTML = (say ? `<p>${escaped(say)}</p>` : "") + (rows ? tableOf(head, rows) : "") + (lines ? plotOf(lines, across) : "")
@@ -128,8 +139,12 @@ class Place {
 
 /** A prediction, and what waits for it: one experiment, and everything after it up to the next section. */
 class Group {
+  field; hidden; teachers;
+
   constructor(label, teachers) {
-    [this.field, this.hidden, this.teachers] = [label.querySelector("textarea"), [], teachers];
+    this.field = label.querySelector("textarea");
+    this.hidden = [];
+    this.teachers = teachers;
     label.insertAdjacentHTML("afterend", '<p class="acts"><button class="seeds">Show the recorded result</button></p>');
     this.button = this.reveal = label.nextElementSibling.firstElementChild; // for a question without an experiment
     this.reveal.addEventListener("click", () => this.open());
@@ -209,4 +224,9 @@ class Lessons extends Stage {
   }
 }
 
-Object.assign(window, { lessons: new Lessons() });
+try {
+  Object.assign(window, { lessons: new Lessons() });
+} catch (error) {
+  document.querySelector(".lead").insertAdjacentHTML("afterend", "<p>This browser cannot run the experiments below: they need WebAssembly with SIMD. The text can be read.</p>");
+  throw error;
+}

@@ -5,7 +5,7 @@ function openTransport() {
   const transport = { readyState: WebSocket.OPEN, permit: true, send: (data) => worker.postMessage(data), close: () => worker.terminate() };
   worker.addEventListener("message", (event) => transport.onmessage(event));
   worker.addEventListener("error", ({ message }) => transport.onclose({ code: 0, reason: message }));
-  worker.postMessage({ wasm: Uint8Array.from(atob(COLONY), (letter) => letter.charCodeAt(0)), headers: HEADERS, link: location.hash.slice(1) });
+  worker.postMessage({ wasm: Uint8Array.from(atob(COLONY), (letter) => letter.charCodeAt(0)), link: location.hash.slice(1) });
   return transport;
 }
 addEventListener("hashchange", () => location.reload());

@@ -1,6 +1,7 @@
 /* worker.js: a colony of the lab as a session of the live page. It answers the page's messages as
  * taichi_ants/live/server.py does, with the same frames; of the edits, it knows those of EDITS. */
 
+import HEADERS from "./headers.json" with { type: "json" };
 import { CAPACITY, EMPTY, Engine, FOOD, hexDistance, LEARNERS, ROCK } from "../page/engine.js";
 import { decode, partsOf } from "../page/link.js";
 import { SCENE } from "../page/worlds.js";
@@ -39,14 +40,21 @@ function put(engine, cells, what) {
 }
 
 export class LiveColony {
+  playing = false;
+  speed = 12;       // ticks/s
+  owed = 0;         // ticks that are due
+  sessions = 0;
+  inFlight = 0;     // frames that the page has not drawn yet
+  behind = false;   // whether the next frame must be a whole one
+
   /**
    * @param {WebAssembly.Module} module colony.wasm
-   * @param {any} headers headers.json
    * @param {string} link the visit to show, "" for the first screen
    * @param {(message: string | ArrayBuffer) => void} post
    */
-  constructor(module, headers, link, post) {
-    Object.assign(this, { module, headers, post, speed: 12, sessions: 0 });
+  constructor(module, link, post) {
+    this.module = module;
+    this.post = post;
     let visit = { scene: SCENE, events: [], tick: 0 }, damage = "";
     try {
       const parts = partsOf(link);
@@ -82,7 +90,8 @@ export class LiveColony {
       if (one.edit) this.apply(one.edit, one.stroke);
     }
     this.pack(false, false);
-    Object.assign(this, { playing: false, owed: 0, sessions: this.sessions + 1 });
+    [this.playing, this.owed] = [false, 0];
+    this.sessions++;
   }
 
   apply(edit, stroke) {
@@ -166,7 +175,7 @@ export class LiveColony {
 
   /** The header of `Recorder.header` in taichi_ants/viewer/recorder.py. */
   header() {
-    const { headers, scene, engine: { radius, size } } = this, { observation, ...header } = headers.rules[scene.rules], learns = scene.learner !== LEARNERS.frozen;
+    const { scene, engine: { radius, size } } = this, { observation, ...header } = HEADERS.rules[scene.rules], learns = scene.learner !== LEARNERS.frozen;
     let count = 0;
     for (let q = -radius; q <= radius; q++) for (let r = -radius; r <= radius; r++) count += Number(hexDistance(q, r) < radius);
     const cell = size < 2 ** 16 ? "u2" : "u4", types = Object.entries(header.types).map(([name, type]) => [name, type === "cell" ? cell : type]);
@@ -175,7 +184,7 @@ export class LiveColony {
       ...(learns ? { learner: LEARNER_LABELS[scene.learner], table: "shared", ...numbers } : { policy: "frozen", epsilon: scene.epsilon }),
     };
     return {
-      ...header, title: `Ants in a world of ${count} cells`, ranges: [radius, radius, radius], types: Object.fromEntries(types), learns, names: headers.names[header.n_states],
+      ...header, title: `Ants in a world of ${count} cells`, ranges: [radius, radius, radius], types: Object.fromEntries(types), learns, names: HEADERS.names[header.n_states],
       pheromones: header.pheromones.map((one) => ({ ...one, strongest: scene.level })), groups: header.groups.map((group) => ({ ...group, learns })), about: Object.entries(about).map(([name, value]) => [name, String(value)]),
     };
   }
@@ -226,6 +235,6 @@ export function serve() {
   let colony = null;
   addEventListener("message", ({ data }) => {
     if (colony) colony.receive(data);
-    else colony = new LiveColony(new WebAssembly.Module(data.wasm), data.headers, data.link, (message) => postMessage(message));
+    else colony = new LiveColony(new WebAssembly.Module(data.wasm), data.link, (message) => postMessage(message));
   });
 }

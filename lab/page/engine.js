@@ -47,7 +47,8 @@
  *   GRID is the paper's grid, 128 settings for `train`; 100 seeds of one take about 0.2 s
  */
 
-import { FOLLOWERS, makeWorld } from "./worlds.js";
+import FOLLOWERS from "./followers.json" with { type: "json" };
+import { makeWorld } from "./worlds.js";
 
 /** @typedef {import("./worlds.js").Scene} Scene */
 /** @typedef {{ do: "rock" | "food" | "scent" | "erase", reach: number, path: number[], tick?: number }} Stroke */

@@ -1,5 +1,7 @@
 // The scene of a visit, and its world. Worlds are painted in whole numbers, as in taichi_ants/worlds/lab.py.
 
+import LAB from "../../taichi_ants/worlds/lab.json" with { type: "json" };
+
 /**
  * @typedef {object} Scene
  * @property {number} world number in WORLDS
@@ -22,37 +24,6 @@ export const SCENE = {
   world: 0, rules: 15, learner: 0, seed: 85, ants: 64, epsilon: 0.03, rate: 0.1, discount: 0.9,
   learns: 1, first: 5, level: 600, regrowth: 0, shaping: 1,
 };
-
-// The next lines are written by `python lab/engine/build.py`, from taichi_ants.
-/* GENERATED */
-const LAB = {
-  "home": 14, "trail": 25, "pile": 12, "fromHome": 8, "fromEdge": 4,
-  "worlds": [
-    {"name": "meadow", "radius": 32, "queen": [-15, -18], "shapes": [
-      [5, 6, -12, 9], [5, 9, -9, 13], [5, 11, -5, 6], [5, 23, 4, 9], [5, 23, 7, 6], [5, 12, -1, 5],
-      [5, -9, 3, 13], [5, -10, 6, 9], [5, -14, -1, 6], [5, 2, 19, 12], [5, 1, 21, 8],
-      [5, -28, -16, 9], [5, -28, -13, 5], [5, -20, 8, 9], [5, -17, 11, 4], [5, -4, -25, 7],
-      [5, -7, -25, 3], [5, 27, 15, 6], [5, 26, 17, 3], [5, 16, 28, 4], [7, 17, 19, 13]
-    ]},
-    {"name": "plain", "radius": 64, "queen": [0, 0], "rocks": 90, "largest": 24, "piles": 9, "nearest": 14, "shapes": []},
-    {"name": "steppe", "radius": 130, "queen": [0, 0], "rocks": 260, "largest": 40, "piles": 24, "nearest": 14, "shapes": []},
-    {"name": "bridge", "radius": 24, "queen": [-17, 0], "walled": true, "shapes": [
-      [0, -17, 0, 27], [0, -12, 0, 1, 0, 2], [0, 10, 0, 1, 0, 2], [0, 17, 0, 27],
-      [0, -10, 0, 1, 1, 3], [0, -7, 3, 1, 0, 17], [0, 10, 3, 1, 5, 3], [0, -10, 0, 1, 5, 9],
-      [0, -10, -9, 1, 0, 11], [0, 1, -9, 1, 1, 9], [7, 17, 0, 9]
-    ]},
-    {"name": "paper", "radius": 10, "queen": [-9, 0], "shapes": [
-      [2, -8, 0, 0, 0, 16], [7, 9, 0, 0]
-    ]},
-    {"name": "daily", "radius": 30, "queen": [-13, -15], "rocks": 36, "largest": 13, "piles": 2, "nearest": 28, "daily": true, "shapes": []}
-  ]
-};
-export const FOLLOWERS = {
-  128: "BCDHEADHBBBHHHHHFBDHDADHBBBHHHHHAAEHAAEHBBBHHHHHHHHHHHHHHHHHHHHHGCDPEADPBBFPPPPPFBDPDADPBBFPPPPPAAEPAAEPCCGPPPPPPPPPPPPPPPPPPPPP",
-  432: "BCDHPCEADHPABBBHPBHHHHHHPPPHPPEADHPAFBDHPBDADHPABBBHPBHHHHHHPPPHPPDADHPAAAEHPAAAEHPABBBHPBHHHHHHPPPHPPAAEHPAHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHPPPHPPPPPHPPPPPHPPHHHHHHPPPHPPPPPHPPFBDHPBDADHPABBBHPBHHHHHHPPPHPPDADHPAGCDPDGEADPDEBBBPBBPPPPPPBBBPBBGCDPDGFBDPDFDADPDDBBBPBBPPPPPPBBBPBBFBDPDFAAEPEAAAEPEABBBPBBPPPPPPBBBPBBAAEPEAPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPAAEPEAAAEPEABBBPBBPPPPPPBBBPBBAAEPEAGCDPDGEADPDEBBBPBBPPPPPPBBBPBBGCDPDG",
-  686: "BCDHDCPEADHDAPBBBHBBBHHHHHHHBBBHBBBEADHDAPPPDHPPPFBDHDBPDADHDAPBBBHBBBHHHHHHHBBBHBBBDADHDAPPPDHPPPAAEHAAAAAEHAAABBBHBBBHHHHHHHBBBHBBBAAEHAAAAAEHAAAHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHHAADHEAPAADHEAPBBBHBBBHHHHHHHBBBHBBBAADHEAPPPDHPPPFBDHDBPDADHDAPBBBHBBBHHHHHHHBBBHBBBDADHDAPPPDHPPPPPDHPPPPPDHPPPBBBHBBBHHHHHHHBBBHBBBPPDHPPPPPDHPPPGCDPDGHEADPDEHBBBPBBBPPPPPPPBBBPBBBGCDPDGHHHDPDHHFBDPDFHDADPDDHBBBPBBBPPPPPPPBBBPBBBFBDPDFHHHDPDHHAAEPEAAAAEPEAABBBPBBBPPPPPPPBBBPBBBAAEPEAAAAEPEAAPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPPAAEPEAAAAEPEAABBBPBBBPPPPPPPBBBPBBBAAEPEAAAAEPEAAGCDPDGHEADPDEHBBBPBBBPPPPPPPBBBPBBBGCDPDGHHHDPDHHHHDPDHHHHDPDHHBBBPBBBPPPPPPPBBBPBBBHHDPDHHHHDPDHH",
-};
-/* END */
 
 export const WORLDS = /** @type {any[]} */ (LAB.worlds);
 const PAINTS_EMPTY = 0, PAINTS_SCENT = 2, PAINTS_ROCK = 5, PAINTS_FOOD = 7;

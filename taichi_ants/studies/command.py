@@ -79,7 +79,7 @@ def planned(module: str, settings: Namespace) -> Planned:
             salt.append(str(getattr(loaded, "VERSION", checksum_of(codes["study"]))))
         if plugin is not None:
             salt.append(f"plugin {checksum_of(codes['plugin'])}")
-        if arch != "cpu":  # whose last bits differ
+        if arch != "cpu":  # nobody has compared a GPU with it yet
             salt.append(arch)
         study = replace(getattr(plan, "study", plan), salt=tuple(salt))
         assert study.keys  # which read the files of policies

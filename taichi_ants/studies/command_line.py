@@ -96,7 +96,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--plugin", metavar="FILE", help=PLUGIN)
     add_threads(parser)
-    arch = "processor: cpu, or cuda for an NVIDIA GPU (lone ants only, with other last bits)"
+    arch = "processor: cpu, or cuda for an NVIDIA GPU"
     add("--arch", choices=("cpu", "cuda"), default="cpu", help=arch)
 
 

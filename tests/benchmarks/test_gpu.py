@@ -38,7 +38,7 @@ def test_results_that_differ_are_an_error(monkeypatch, capsys):
 
 def test_parts_are_left_out_after_some_time(capsys):
     run("--on-cpu", "--only", "colony", "--seconds", "0")
-    assert capsys.readouterr().out.count("left out\n") == 2 * len(gpu.record.drawing.GROUPS)
+    assert capsys.readouterr().out.count("  left out\n") == len(gpu.record.drawing.GROUPS)
 
 
 def test_without_a_gpu_it_says_so(monkeypatch, capsys):

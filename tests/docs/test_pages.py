@@ -13,8 +13,8 @@ import sys
 
 import pytest
 from command_lines import ROOT, environment
-from guides import BLOCK
 
+BLOCK = re.compile(r"^```(?P<language>\w*)\n(?P<code>.*?)^```$", re.M | re.S)
 PAGES = {
     str(path.relative_to(ROOT)): text
     for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))

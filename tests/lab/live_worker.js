@@ -4,8 +4,7 @@ import { createInterface } from "readline";
 import { LiveColony } from "../../lab/live/worker.js";
 
 const [folder, link] = process.argv.slice(2);
-const headers = JSON.parse(fs.readFileSync(`${folder}/../live/headers.json`));
 const write = (message) => fs.writeSync(1, `${typeof message === "string" ? message : Buffer.from(message).toString("base64")}\n`);
-const colony = new LiveColony(new WebAssembly.Module(fs.readFileSync(`${folder}/colony.wasm`)), headers, link, write);
+const colony = new LiveColony(new WebAssembly.Module(fs.readFileSync(`${folder}/colony.wasm`)), link, write);
 for await (const line of createInterface({ input: process.stdin })) colony.receive(line);
 process.exit();

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from guides import blocks
 
 from taichi_ants import TrainingConfig
 from taichi_ants.commands import watch
@@ -37,11 +36,3 @@ def test_the_form_has_every_setting_with_its_bounds():
     assert half_life["only"] == ["task.pheromone.evaporation", "exponential"]
     assert offered["training.planning_steps"]["learner"] != ""
     assert offered["world.aside"]["world"] == "double_bridge"
-
-
-def test_the_python_of_the_guide_works(tmp_path, monkeypatch):
-    names: dict = {}
-    monkeypatch.chdir(tmp_path)
-    exec("\n".join(blocks("how-to/colonies", "Watch ants live")), names)
-    assert names["session"].ticks == 2500
-    assert (tmp_path / "mine.npz").exists()

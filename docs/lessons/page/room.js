@@ -22,7 +22,7 @@ export const PLAN = {
 }`,
 };
 
-const largest = ([a, b, c, d, e, f]) => Math.max(a, b, c, d, e, f);
+const largest = (/** @type {number[]} */ [a, b, c, d, e, f]) => Math.max(a, b, c, d, e, f);
 
 function learn(q, { s, a, r, next, over }, bonus = 0) {
   q[s][a] += ALPHA * (r + bonus + (over ? 0 : GAMMA * largest(q[next])) - q[s][a]);

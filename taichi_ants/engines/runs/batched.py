@@ -181,6 +181,7 @@ class BatchedEnvironments:
             if runtime.compiles_for_gpu() and self._cells_on_gpu is None:
                 self._cells_on_gpu = cells = on_device(self.arrays["cells"])
                 self._arguments["cells"] = self._of_steps["cells"] = cells
+                self._of_steps["numbers"] = on_device(self._of_steps["numbers"])
         return self._launches[follows, width]
 
     def snapshot(self, number: int) -> Snapshot:

@@ -36,6 +36,7 @@ from taichi_ants.task.rules.policy import BY_VALUES, chance_of, choose
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
 # indices are not negative.
 _PLACES = 2**30 - 1
+THREADS_OF_BLOCK = 32  # which a GPU starts together
 
 
 @cache
@@ -58,7 +59,7 @@ def run_kernel(
     n_states = rules.observation.n_states
     table = n_states * ROW
     # A CPU distributes runs one by one, as they are uneven.
-    block = 32 if has_guards(arguments) else 1
+    block = THREADS_OF_BLOCK if has_guards(arguments) else 1
 
     @ti.func
     def decide(a: ti.template(), begin, ant, state, explore_below):

@@ -40,7 +40,7 @@ CODES_OF_CHUNK = LENGTH * _STRIDE  # of `WIDTH` ants
 # A code is an i64: the state, and from these bits on the result of the step (`layout.TERMINATED`)
 # and the action.
 _RESULT, _ACTION = 32, 40
-_BLOCK = 128  # threads of a GPU that start together
+_THREADS_OF_BLOCK = 128  # which a GPU starts together
 
 
 @cache
@@ -208,7 +208,7 @@ def rollout_kernel(
 
     @ti.kernel
     def rollout_on_gpu(a: arguments):
-        ti.loop_config(block_dim=_BLOCK)
+        ti.loop_config(block_dim=_THREADS_OF_BLOCK)
         for i in range(parts_of(a, numbers).n):
             take_all(parts_of(a, numbers), i)
 

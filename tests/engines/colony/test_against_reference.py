@@ -174,7 +174,7 @@ def test_every_tick_with_castes_and_division_of_labour(kernel):
     *parts, castes, labour, nests, more = kernel
     seen, cues = np.zeros(6, dtype=int), more.get("cues_of")
     rules = {name: one for name, one in more.items() if name != "cues_of"}
-    for seed in range(12):
+    for seed in range(18):
         drawn = of_kernel(seed, *parts, **rules)
         if nests > 1:
             drawn = with_nests(drawn, seed, nests, 1, loads=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from ctypes.util import find_library
 
 import drawing
 import numpy as np
@@ -141,3 +142,10 @@ def test_a_gpu_has_no_other_schedule():
     assert [schedule_of(None, 1, n, "cuda") for n in (1, 10**6)] == [BY_ANT] * 2
     with pytest.raises(AntsError, match=r"^schedule is 'by_chunk'; .*by_ant\.$"):
         schedule_of("by_chunk", 1, 10**6, "cuda")
+
+
+@pytest.mark.skipif(find_library("cuda") is not None, reason="this machine may have a GPU")
+def test_a_machine_without_a_gpu_says_so_in_one_sentence():
+    with pytest.raises(AntsError, match=r"^arch is 'cuda', but no CUDA device is usable here; .*"):
+        Colony(worlds.paper(), task.foraging(), DYNA_Q, arch="cuda")
+    made("by_world").tick()  # Taichi starts anew
