@@ -83,7 +83,7 @@ def test_what_is_written_between_ticks_counts():
         one.tick(5)
         one.epsilon = 0.9
         one.next_actions[:, 0] = 1
-        one.set_learning_rate(0.01)
+        one._set_learning_rate(0.01)
         one.tick(5)
         one.tick(5)
         one.end_episode()
