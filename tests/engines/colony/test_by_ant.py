@@ -17,6 +17,12 @@ from taichi_ants.engines.colony import state
 from taichi_ants.engines.colony.layout import BY_ANT, schedule_of
 
 QUICK = "nests", "castes_fields"
+LATER = "piles", "followers", "labour_fields", "own_deposit", "n_step"  # the others take a minute
+MARKED = [
+    pytest.param(one, marks=[] if one in QUICK else getattr(pytest.mark, later))
+    for one in drawing.GROUPS
+    for later in ["slow" if one in LATER else "long"]
+]
 DYNA_Q = TrainingConfig("dyna_q", 0.2, 0.9, 0.3, 0.97, planning_steps=2)
 SARSA = TrainingConfig("sarsa", 0.5, 0.9, 0.3, 0.97)
 MOST_ARGUMENTS = 64  # of a launch on a GPU
@@ -48,10 +54,7 @@ def assert_same(one: Colony, other: Colony) -> None:
     assert one.outcome() == other.outcome()
 
 
-@pytest.mark.parametrize(
-    "group",
-    [one if one in QUICK else pytest.param(one, marks=pytest.mark.slow) for one in drawing.GROUPS],
-)
+@pytest.mark.parametrize("group", MARKED)
 def test_drawn_colonies_have_the_recorded_hashes(group):
     (one,) = drawing.colonies_of(group, 1)
     name, drawn = one
