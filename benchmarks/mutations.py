@@ -225,7 +225,6 @@ MUTATIONS = [
     ("engines/colony/learning.py", "ti.atomic_max(c.latest", "ti.atomic_min(c.latest", BY_ANT),
     ("engines/colony/kernels.py", "if running == 1 and slot <", "if slot <", ENGINE),
     ("engines/colony/device.py", "if numbers != self._numbers:", "if not self._numbers:", BY_ANT),
-    ("engines/colony/device.py", "shape) != (array", "shape) == (array", BY_ANT),
     ("engines/colony/steps.py", "moves & (1 - enters)", "moves & enters", COLONY),
     ("engines/colony/steps.py", "tick) > level_of", "tick) >= level_of", TRAFFIC),
     ("engines/colony/steps.py", "c.carried[ant] = 1", "c.carried[ant] = 0", COLONY),
