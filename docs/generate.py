@@ -185,8 +185,7 @@ def spaces(name: str) -> str:
     return table(
         ("Space", "Value"),
         [["observation", f"`{made.single_observation_space}`"],
-         ["action", f"`{made.single_action_space}`"],
-         ["observation, of 2 environments", f"`{made.observation_space}`"]],
+         ["action", f"`{made.single_action_space}`"]],
     )  # fmt: skip
 
 
@@ -207,7 +206,16 @@ def filled(page: str) -> str:
 
 MODULES = (
     *("", "worlds", "task", "task.observations", "task.states", "interventions", "learners"),
-    *("learners.policies", "learners.memory", "measures", "rules", "envs", "envs.colony_v0"),
+    *(
+        "learners.policies",
+        "learners.memory",
+        "measures",
+        "rules",
+        "envs",
+        "envs.forage",
+        "envs.colony",
+        "envs.colony_v0",
+    ),
     *("rendering", "viewer", "offline", "analysis.statistics", "analysis.behaviour"),
     *("analysis.bounds", "analysis.style", "testing", "reference"),
 )

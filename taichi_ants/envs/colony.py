@@ -23,6 +23,8 @@ from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features.support import BASE, CASTES, CHOICE
 from taichi_ants.task.constants import N_ACTIONS, RIGHT, Event
 
+__all__ = ["HexColonyVectorEnv"]
+
 # The default length of a colony's episode, in ticks.
 MAX_STEPS = 1000
 SUPPORTS = BASE - CHOICE - CASTES - {"choice.rule=softmax"}  # actions are given
@@ -168,12 +170,12 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
     ant is terminated. The autoreset mode is `SAME_STEP`, because episodes of ants begin in the step
     of a delivery.
 
-    ## Arguments
-    - `num_envs`: The number of ants in all worlds together, a multiple of `ants`.
-    - `ants`: The number of ants in each world.
-    - `task`: See `HexForageEnv`; without births and lifespan.
-    - `start`, `max_steps`: See `HexColonyParallelEnv`.
-    - All others: See `HexForageEnv`; `render` draws each ant's world.
+    Args:
+        num_envs: The number of ants in all worlds together, a multiple of `ants`.
+        ants: The number of ants in each world.
+        task: See `HexForageEnv`; without births and lifespan.
+        start, max_steps: See `HexColonyParallelEnv`.
+        others: See `HexForageEnv`; `render` draws each ant's world.
     """
 
     def __init__(

@@ -36,6 +36,8 @@ from taichi_ants.learners.policies import checked_table, frozen_policy
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, N_ACTIONS
 
+__all__ = ["HexForageEnv", "HexForageVectorEnv", "Rollout"]
+
 _WHOLE = (int, np.int64)  # the types of most actions
 SUPPORTS = LONE - CHOICE - {"choice.rule=softmax"}  # actions are given
 DELIVERIES = ("terminates", "truncates", "continues")
@@ -116,9 +118,8 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
     The rules are those of "Ants and Reinforcement Learning Algorithms"; see
     `docs/reference/environments.md`, also for what codes in observations mean.
 
-    ## Spaces
-    Observations have k parts of sizes p1, ..., pk, which depend on the task. The paper's have the
-    sizes (2, 4, 4, 4): the load, then a code for each of the cells left, forward and right.
+    **Spaces.** Observations have k parts of sizes p1, ..., pk, which depend on the task. In the
+    paper's, these are (2, 4, 4, 4): the load, then a code for each cell left, forward and right.
 
     - "cells": `MultiDiscrete([p1, ..., pk])`, int64 (k,).
     - "index": `Discrete(p1 * ... * pk)`, the state index.
@@ -127,7 +128,8 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
     Actions are `Discrete(5)`: 0, 1 and 2 turn the ant to the cell left, forward or right and enter
     it, 3 picks up food in view, and 4 gives it to the queen in view. A blocked move still turns.
 
-    ## Info
+    **Info.**
+
     - `state`: int64, the state index.
     - `action_mask`: int8 (5,), 1 for actions that can succeed; in a dead end, for the moves.
     - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset`.
@@ -135,14 +137,14 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
     - `deliveries`: int64, the deliveries of this episode. Report them beside the return, because
       under the paper's rewards walking a trail can pay more than delivering.
 
-    ## Arguments
-    - `world`: The name of a registered world, the path or the text of a map, or a World.
-    - `task`: The rules, a `taichi_ants.Task` or its name; by default, the paper's. Trails evaporate
-      if its `evaporation_in_training` is True. AntsError if a rule is only for colonies.
-    - `delivery`: "terminates", "truncates" or "continues" the episode; by default, the task's.
-    - `max_steps`: The number of steps after which an episode is truncated.
-    - `observation_format`: "cells", "index" or "one_hot".
-    - `render_mode`: "rgb_array" for pictures, uint8 (720, 1280, 3), or None.
+    Args:
+        world: The name of a registered world, the path or the text of a map, or a World.
+        task: The rules, a `taichi_ants.Task` or its name; by default, the paper's. Trails evaporate
+            if its `evaporation_in_training` is True. AntsError if a rule is only for colonies.
+        delivery: "terminates", "truncates" or "continues" the episode; by default, the task's.
+        max_steps: The number of steps after which an episode is truncated.
+        observation_format: "cells", "index" or "one_hot".
+        render_mode: "rgb_array" for pictures, uint8 (720, 1280, 3), or None.
     """
 
     metadata = METADATA
@@ -257,12 +259,12 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
     Environment i equals a `HexForageEnv` with seed `seed + i` in each step. Arrays have a leading
     axis of `num_envs`, and infos have the format of Gymnasium's vector environments.
 
-    ## Arguments
-    - `num_envs`: The number of environments; each takes 4 bytes for each cell of its world.
-    - `world`: See `HexForageEnv`; or a list of n worlds with the same ranges, of which environment
-    i has entry i modulo n.
-    - `autoreset_mode`: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
-    - All others: See `HexForageEnv`; `render` draws all worlds.
+    Args:
+        num_envs: The number of environments; each takes 4 bytes for each cell of its world.
+        world: See `HexForageEnv`; or a list of n worlds with the same ranges, of which environment
+            i has entry i modulo n.
+        autoreset_mode: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
+        others: See `HexForageEnv`; `render` draws all worlds.
     """
 
     _ants: LoneAnts
