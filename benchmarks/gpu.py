@@ -105,14 +105,15 @@ def speed_of_environments(rolls: bool) -> float:
     """Return million steps/s of environments with random actions."""
     env = HexForageVectorEnv(MANY, observation_format="index")
     env.reset(seed=0)
+    length = 64 if rolls else 1
     actions = np.random.default_rng(0).integers(5, size=MANY)
+    act = (
+        partial(env.rollout, "random", length, epsilon=1.0) if rolls else partial(env.step, actions)
+    )
 
     def steps() -> int:
-        if rolls:
-            env.rollout("random", 64, epsilon=1.0)
-        else:
-            env.step(actions)
-        return (64 if rolls else 1) * MANY
+        act()
+        return length * MANY
 
     steps()
     return pace(steps, 2.0)[0] / 1e6
@@ -145,12 +146,12 @@ def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
     """Return a table of results that are equal or not, and one of speeds."""
     began, rows = time.perf_counter(), dict[str, list[str]]()
     expected = environments() if word in "environments" else ""
-    about, measures = machine(("taichi", "numpy")), {} if on_cpu else SPEEDS
+    name, bandwidth, measures = "Without a GPU, on a CPU", 0.0, {} if on_cpu else SPEEDS
     if on_cpu:
         runtime.gpu_kernels_on_cpu = True
     else:
         name, bandwidth = card()
-        about = f"{name}, {figure(bandwidth / 1e12)} TB/s; {about}"
+        name += f", {figure(bandwidth / 1e12)} TB/s"
         runtime.start(arch="cuda")
     compared = {case: one for case, one in cases(expected).items() if word in case}
     first = [case for case in ("training: q_learning", "colony: plain") if case in compared]
@@ -161,7 +162,7 @@ def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
             elif case in measures:
                 goal, measure = measures[case]
                 rows[case] = [case, figure(found := measure()), "", ""]
-                if goal:
+                if goal and bandwidth:
                     goal *= bandwidth / _H200
                     rows[case][2:] = figure(goal), figure(found / goal)
             else:
@@ -172,11 +173,14 @@ def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
         print(*rows[case], sep="  ", flush=True)
     paces = [row for case, row in rows.items() if case in measures]
     results = [summary(kind, rows) for kind in ("environments", "training", "colony")]
-    columns = ["M steps/s", "measured", "goal", "share of it"]
-    return [
-        *([Table("Speed on a GPU", columns, paces)] if paces else []),
-        Table("Results", ["", "cases", "equal to a CPU's", "others"], results, [about]),
-    ]
+    about, columns = (
+        f"{name}: {machine(('taichi', 'numpy'))}",
+        ["", "cases", "equal to a CPU's", "others"],
+    )
+    made = [Table("Results of kernels for a GPU", columns, results, [about])]
+    if paces:
+        made.insert(0, Table("Speed", ["M steps/s", "measured", "goal", "share of it"], paces))
+    return made
 
 
 def summary(kind: str, rows: dict[str, list[str]]) -> list[str]:

@@ -30,6 +30,7 @@ NESTS = "tests/engines/colony/test_nests.py"
 RASTER = "tests/rendering/test_raster.py"
 CASTES = "tests/engines/colony/test_castes.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
+ENGINE = "tests/engines/colony/test_engine.py"
 BY_ANT = "tests/engines/colony/test_by_ant.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
@@ -222,7 +223,7 @@ MUTATIONS = [
     ("engines/colony/learning.py", "c.initial_q, 0.0)", "0.0, 0.0)", COLONY),
     ("engines/colony/learning.py", "if number > c.sums_of", "if number < c.sums_of", SCHEDULES),
     ("engines/colony/learning.py", "ti.atomic_max(c.latest", "ti.atomic_min(c.latest", BY_ANT),
-    ("engines/colony/kernels.py", "if running == 1 and slot <", "if slot <", BY_ANT),
+    ("engines/colony/kernels.py", "if running == 1 and slot <", "if slot <", ENGINE),
     ("engines/colony/device.py", "if numbers != self._numbers:", "if not self._numbers:", BY_ANT),
     ("engines/colony/device.py", "shape) != (array", "shape) == (array", BY_ANT),
     ("engines/colony/steps.py", "moves & (1 - enters)", "moves & enters", COLONY),

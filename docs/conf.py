@@ -89,6 +89,14 @@ def link_apps(app: Any, doctree: nodes.document) -> None:
             node.replace_self(nodes.reference("", "", *node.children, refuri=uri))
 
 
+def mend_page(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
+    """Give captions of the navigation their level, and let the keyboard scroll wide code."""
+    tree, level = context.get("furo_navigation_tree", ""), 'role="heading" aria-level="2"'
+    context["furo_navigation_tree"] = tree.replace('role="heading"', level)
+    if "body" in context:
+        context["body"] = re.sub(r"<pre(?= id=|>)", '<pre tabindex="0"', context["body"])
+
+
 def visit_math(self: Any, node: Any) -> None:
     """Write a formula as MathML, which browsers draw and read aloud without a script."""
     inline = isinstance(node, nodes.math)
@@ -135,6 +143,7 @@ def copy_notebooks(app: Any, error: Exception | None) -> None:
 
 def setup(app: Any) -> None:
     app.connect("doctree-read", link_apps, priority=100)
+    app.connect("html-page-context", mend_page, priority=900)  # after the theme
     app.connect("builder-inited", draw_card)
     app.connect("build-finished", write_sitemap)
     app.connect("build-finished", copy_notebooks)

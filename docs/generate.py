@@ -43,7 +43,8 @@ def settings_table(owner: Any, path: str = "") -> str:
     for one in declared(owner):
         values, default, meaning = one.in_words
         if one.is_group:
-            values = f"{values}; see [below](#{one.path.replace('.', '').lower()}-{one.kind.__name__.lower()})"
+            anchor = f"{one.path.replace('.', '')}-{one.kind.__name__}".lower()
+            values = f"{values}; see [below](#{anchor})"
         rows.append([f"`{one.path}`", values, default, meaning])
     return table(("Setting", "Values", "Default", "Meaning"), rows)
 
@@ -60,7 +61,7 @@ def groups_of(owner: Any) -> Iterator[str]:
 
 
 def settings(kind: str) -> str:
-    """Return the settings of a class with its groups, or of all learners or worlds that have some."""
+    """Return the settings of a class with its groups, or of all learners or worlds."""
     if kind == "learners":
         owners = {name: learners.get(name).hyperparameters for name in learners.names()}
     elif kind == "worlds":
@@ -119,7 +120,7 @@ def inputs(kind: str) -> str:
     return f"{result}\n\n" + table(("Input", "Form", "Meaning"), lines)
 
 
-class Captured(Exception):
+class Captured(Exception):  # noqa: N818
     """A parser, in place of what it would parse."""
 
 

@@ -205,8 +205,8 @@ def search(
     """Return results of independent colonies that search for the shortest path to food.
 
     The methods are Ant System (Dorigo, Maniezzo and Colorni 1996) and MAX-MIN Ant System (Stuetzle
-    and Hoos 2000); docs/models/ant_system.md has their rules and papers. Every ant walks at random from
-    the queen until it reaches food. Its walk without loops is its *tour*.
+    and Hoos 2000); docs/models/ant_system.md has their rules and papers. Every ant walks at random
+    from the queen until it reaches food. Its walk without loops is its *tour*.
 
     With "ant_system", all ants deposit. With "max_min", the best ant of the iteration does, and tau
     stays between bounds that depend on the shortest tour so far. `alpha` is the exponent of

@@ -119,7 +119,7 @@ def _exists(kinds: tuple[type, ...]) -> bool:
 
 
 def check_on_cpu(running: Runtime, what: str) -> None:
-    """Raise AntsError if Taichi runs on a GPU, for kernels with too many arguments for one."""
+    """Raise AntsError if Taichi runs on a GPU, for kernels whose threads wait for each other."""
     if running.arch != "cpu":
         raise AntsError(f"arch is {running.arch!r}, but {what} only on the CPU; use arch='cpu'.")
 

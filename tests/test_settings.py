@@ -16,10 +16,8 @@ from typing import Annotated, Literal
 
 import numpy as np
 import pytest
-from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig, learners
-from taichi_ants.features.rule import RULES
 from taichi_ants.interventions import INTERVENTIONS, Clear
 from taichi_ants.protocol import EVENTS as EVENTS_BY_NAME
 from taichi_ants.settings import (
@@ -28,7 +26,6 @@ from taichi_ants.settings import (
     Setting,
     Settings,
     all_of,
-    declared,
     named_groups,
     nested,
 )
@@ -157,26 +154,6 @@ class NamedSoup(Soup, path="kitchen.soups.NAME"):
     """A soup with a name."""
 
 
-def table(cls: type) -> str:
-    """The settings of a class as a table of the documentation, in Markdown."""
-    rows = ["| Setting | Values | Default | Meaning |", "|---|---|---|---|"]
-    for one in all_of(cls):
-        if one.kind is Named:
-            rows.append(f"| `{one.path}` | {one.allowed} | none | {one.rule.help} |")
-            rows += table(one.entry).splitlines()[2:]
-        elif not one.is_group:
-            unit = f", in {one.rule.unit}" if one.rule.unit else ""
-            usual = one.default if one.rule.usual is None else one.rule.usual
-            words = {MISSING: "required", None: "none" if one.kind is list else "off"}
-            default, meaning = words.get(usual, f"`{usual!r}`"), one.rule.help
-            if one.rule.only is not None:
-                other, *values = one.rule.only
-                allowed = re.sub(r", (?=[^,]*$)", " or ", ", ".join(map(repr, values)))
-                meaning += f"; only with `{other}` {allowed}"
-            rows.append(f"| `{one.path}` | {one.allowed}{unit} | {default} | {meaning} |")
-    return "\n".join(rows)
-
-
 def refused(make) -> str:
     with pytest.raises(AntsError) as caught:
         make()
@@ -236,14 +213,3 @@ def test_named_settings_are_checked_changed_and_compared_by_name_and_order():
 ])  # fmt: skip
 def test_sentences(make, says):
     assert refused(make) == f"`kitchen{says}"
-
-
-def test_the_page_of_settings_is_made_from_the_declarations():
-    page = (ROOT / "docs" / "reference" / "settings.md").read_text()
-    for kind in KINDS:
-        assert table(kind) in page
-    for rule in RULES.built_in.values():
-        assert {*table(rule.settings).splitlines()} <= {*page.splitlines()}
-    for name in learners.names():
-        if declared(learners.get(name).hyperparameters):
-            assert table(learners.get(name).hyperparameters) in page

@@ -2,7 +2,7 @@
  * taichi_ants/live/server.py does, with the same frames; of the edits, it knows those of EDITS. */
 
 import HEADERS from "./headers.json" with { type: "json" };
-import { CAPACITY, EMPTY, Engine, FOOD, hexDistance, LEARNERS, ROCK } from "../page/engine.js";
+import { CAPACITY, EMPTY, Engine, FOOD, LEARNERS, ROCK } from "../page/engine.js";
 import { decode, partsOf } from "../page/link.js";
 import { SCENE } from "../page/worlds.js";
 
@@ -176,8 +176,7 @@ export class LiveColony {
   /** The header of `Recorder.header` in taichi_ants/viewer/recorder.py. */
   header() {
     const { scene, engine: { radius, size } } = this, { observation, ...header } = HEADERS.rules[scene.rules], learns = scene.learner !== LEARNERS.frozen;
-    let count = 0;
-    for (let q = -radius; q <= radius; q++) for (let r = -radius; r <= radius; r++) count += Number(hexDistance(q, r) < radius);
+    const count = 3 * radius * (radius - 1) + 1; // cells
     const cell = size < 2 ** 16 ? "u2" : "u4", types = Object.entries(header.types).map(([name, type]) => [name, type === "cell" ? cell : type]);
     const numbers = { "learning rate": scene.rate, discount: scene.discount }, about = {
       world: `${count} cells, ranges ${radius}, ${radius}, ${radius}`, "ants at the start": scene.ants, seed: scene.seed, observation,

@@ -20,6 +20,7 @@ from taichi_ants.live.server import SessionServer
 from taichi_ants.live.session import Session
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_it_promptly_in_one_line(kernels: Path, tmp_path: Path) -> None:
     process = start("watch", ["--no-browser"], kernels, tmp_path)
     assert process.stdout is not None

@@ -58,7 +58,17 @@ def test_a_number_is_that_of_its_cell(tmp_path, monkeypatch):
             published.cell(place)
 
 
-@pytest.mark.slow  # it makes the paper's comparison with 100 seeds
+@pytest.mark.slow
+def test_a_hundred_policies_of_the_readme_do_what_it_says(tmp_path):
+    """One of the 64 configurations of the comparison."""
+    one = ["--learners", "dyna_q", "--planning-steps", "5", "--learning-rates", "0.01"]
+    one += ["--discounts", "0.99", "--epsilons", "0.5", "--epsilon-decays", "0.995"]
+    with pytest.raises(SystemExit):
+        compare.main(["--out", str(tmp_path / "one"), "--no-figures", *one])
+    assert_policies_are_as_published(tmp_path / "one")
+
+
+@pytest.mark.long  # it makes the paper's comparison with 100 seeds
 def test_a_rerun_of_the_comparison_has_the_published_tables(tmp_path):
     folder = tmp_path / "compare"
     with pytest.raises(SystemExit):
@@ -69,6 +79,10 @@ def test_a_rerun_of_the_comparison_has_the_published_tables(tmp_path):
         assert path.read_bytes() == published.data_file(path.stem).read_bytes()
     wins = [cells[1] for cells in published.tables("paper_winners")[0].rows]
     assert wins == [f"{100 * share:.0f} %" for share in findings.winners(folder)]
+    assert_policies_are_as_published(folder)
+
+
+def assert_policies_are_as_published(folder):
     codes, counts = np.unique(findings.policies(folder), return_counts=True)
     place = "paper_policies; Dyna-Q (p5) +; terminates"
     for code, count in zip(codes, counts, strict=True):

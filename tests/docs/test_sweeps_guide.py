@@ -30,6 +30,7 @@ def of_file(name, seed, **row):
     return {**file, "seeds": [seed], "vary": {name: [value] for name, value in row.items()}}
 
 
+@pytest.mark.slow
 def test_the_row_of_a_colony_is_the_one_of_the_guide(tmp_path, capsys):
     row = {"task.pheromone.half_life": 20, "task.pheromone.deposit": "add"}
     wanted = row_of(of_file("trails.toml", 3, **row), tmp_path)

@@ -78,7 +78,7 @@ def test_home_trail_averages_the_last_five_episodes(script):
     assert len(rows) == 3 * 2 * 6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_home_trail_that_nobody_follows_does_not_matter(script):
     found = script("models/home_trail")
     models = {
@@ -146,6 +146,7 @@ def test_times_to_recover_by_hand(script):
     assert results[0][-1] == {"removed": 0.5, "seed": 2, "tick": 250, "ants": 95}
 
 
+@pytest.mark.slow
 def test_removing_no_ants_does_not_matter_and_removing_them_does(script):
     found = script("models/recovery", REMOVAL=100, TICKS=250)
     none, half, all_of_them = (found["ants_over_time"]([0, 1], x) for x in (0.0, 0.5, 1.0))
@@ -226,8 +227,13 @@ def test_chosen_branches_by_hand(script):
     assert table(summary[:3], "short (%)", "one side (%)") == [(100, 0), (0, 100), (0, 0)]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("marks", ["both ways", "on the return"])
+@pytest.mark.parametrize(
+    "marks",
+    [
+        pytest.param("both ways", marks=pytest.mark.slow),
+        pytest.param("on the return", marks=pytest.mark.long),
+    ],
+)
 def test_sides_of_equal_branches_do_not_matter_and_a_closed_branch_does(script, marks):
     found = script("models/double_bridge", TICKS=2000)
     model, short = found["MODELS"][marks], found["SHORT"]
@@ -258,6 +264,7 @@ def test_shares_of_foragers_by_hand(script):
     assert rows == [(50, 1 / 3), (100, 2 / 3), (150, 2 / 3), (200, 1 / 3)]
 
 
+@pytest.mark.slow
 def test_equal_thresholds_do_not_divide_labour_and_different_ones_do(script):
     found = script("models/division_of_labour", TICKS=2000)
 
@@ -478,6 +485,7 @@ def test_more_room_than_ants_does_not_matter_to_utilities_and_evaporation_does(s
 # experiments/bridge.py
 
 
+@pytest.mark.slow
 def test_names_of_equal_branches_do_not_matter():
     """On a symmetric bridge, the short branch of the mirror image is the long one, ant by ant."""
     ones, others = ({"short": 8, "long": 8, "mirrored": mirrored} for mirrored in (False, True))

@@ -160,6 +160,7 @@ def results(model: str, colonies: int = 6, **how: int) -> list[np.ndarray]:
     return [one for one in vars(found).values() if isinstance(one, np.ndarray)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["goss", "ant_system", "utility"])
 def test_neither_threads_nor_other_colonies_change_a_colony(model: str, monkeypatch) -> None:
     monkeypatch.setattr(goss, "_LAUNCH", 4)

@@ -198,6 +198,7 @@ def test_the_sheet_of_an_observation_of_more_cells(lines) -> None:
 # The command lines.
 
 
+@pytest.mark.slow
 def test_learning_and_a_sheet_from_the_command_line(tmp_path: Path, capsys) -> None:
     place = tmp_path / "a.gif"
     arguments = ["--seed", 5, "--checkpoints", 0, 2, "--max-steps", 9, "--size", "300x200"]

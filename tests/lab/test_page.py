@@ -47,16 +47,16 @@ NAMELESS = """[...document.querySelectorAll("button, input, select, canvas")].fi
 ).map((one) => one.outerHTML)"""
 
 
-@pytest.mark.parametrize("name", ["lab.html", "article.html", "lessons.html"])
+@pytest.mark.parametrize("name", ["lab.html", "article.html", "lessons.html", "live.html"])
 def test_the_committed_page_is_built_from_the_modules(name):
     spec = importlib.util.spec_from_file_location("build_lab", ROOT / "lab" / "build.py")
     build = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(build)
     text = FILE.with_name(name).read_text(encoding="utf-8")
-    assert text == build.page(name), "run python lab/build.py"
+    assert text == build.BUILDS[name](), "run python lab/build.py"
     assert len(text) < 400_000
     text = re.sub(r"base64,[\w+/=]+", "", text)
-    assert set(re.findall(r"https?://[\w.]+", text)) == {"http://www.w3.org"}  # a namespace
+    assert set(re.findall(r"https?://[\w.]+", text)) <= {"http://www.w3.org"}  # a namespace
 
 
 def test_the_modules_have_no_errors_of_types():

@@ -78,7 +78,7 @@ SETUPS = {
 }
 BUMP = RULES.yours.pop("live_bump")  # registered only while the tests of this file run
 LATER = ("queueing", "lively")
-MARKED = [pytest.param(one, marks=[pytest.mark.slow] * (one in LATER)) for one in SETUPS]
+MARKED = [pytest.param(one, marks=[pytest.mark.long] * (one in LATER)) for one in SETUPS]
 
 
 @pytest.fixture(scope="module", autouse=True)

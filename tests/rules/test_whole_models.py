@@ -97,7 +97,7 @@ MODELS = {
         {},
     ),
 }
-SLOW = ("deneubourg", "labour of users")
+SLOW = ("labour of users",)
 
 
 def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[ProtocolEvent]] | None:

@@ -6,6 +6,7 @@ import re
 import traceback
 
 import paper.table2
+import pytest
 from command_lines import ROOT, call
 
 from taichi_ants.engines.launch import Launch
@@ -28,6 +29,7 @@ OWN = (f"{ROOT}/taichi_ants/", f"{ROOT}/experiments/")
 ASIDE = {"compiled", "evaluate", "what_policies_do", "trained", "policy_rows"}
 
 
+@pytest.mark.slow
 def test_settings_pass_at_most_twenty_functions_until_table_2(tmp_path, capsys, monkeypatch):
     passed = set()
 

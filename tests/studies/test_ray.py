@@ -143,7 +143,7 @@ def test_a_killed_worker_costs_its_blocks_only(plain, kernels, tmp_path):
     assert_same_results(plain, tmp_path / "a", also=["packages"])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_ctrl_c_ends_ray_and_the_work_resumes(plain, kernels, tmp_path):
     pytest.importorskip("ray")
     (tmp_path / "my.toml").write_text(SWEEP)

@@ -83,7 +83,12 @@ def begun(name: str, epsilon: float = 0.0) -> Colony:
     return colony
 
 
-@pytest.mark.parametrize("name", COLONIES)
+# What differs from others in numbers alone.
+LONG = ("SARSA, terminates", "SARSA(λ) alone", "a random policy", "misreading")
+MARKED = [pytest.param(name, marks=[pytest.mark.long] * (name in LONG)) for name in COLONIES]
+
+
+@pytest.mark.parametrize("name", MARKED)
 def test_reasons_are_those_of_the_rule(browser, tmp_path, name):
     """Ants that never explore never act at random, whatever they learn, misread or slip."""
     colony = begun(name)

@@ -35,7 +35,7 @@ from taichi_ants.viewer.frames import types_of
 # Each entry needs its own kernels: learner, sharing, observation, dense, traffic.
 KERNELS = [
     ("q_learning", "shared", "paper", False, "blocking"),
-    pytest.param("sarsa", "shared", "ants_seen", True, "blocking", marks=pytest.mark.slow),
+    pytest.param("sarsa", "shared", "ants_seen", True, "blocking", marks=pytest.mark.long),
     ("sarsa", "independent", "paper", False, "blocking"),
     pytest.param("q_learning", "frozen", "queues", True, "following", marks=pytest.mark.slow),
 ]

@@ -635,7 +635,8 @@ def lays(c, v, ant, number: ti.template()):
 def tally(c, v, state, chunk, n):
     """Add n to a tally of a chunk, which one thread processes unless `v.by_ant`."""
     if ti.static(v.by_ant):
-        c.tallies[chunk * TALLY_WIDTH + state] += n
+        if n != 0:
+            c.tallies[chunk * TALLY_WIDTH + state] += n
     else:  # without `+=`, which would be atomic and slower
         c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n
 

@@ -17,7 +17,14 @@ from taichi_ants.engines.colony import state
 from taichi_ants.engines.colony.layout import BY_ANT, schedule_of
 
 QUICK = "nests", "castes_fields"
+LATER = "piles", "followers", "labour_fields", "own_deposit", "n_step"  # the others take a minute
+MARKED = [
+    pytest.param(one, marks=[] if one in QUICK else getattr(pytest.mark, later))
+    for one in drawing.GROUPS
+    for later in ["slow" if one in LATER else "long"]
+]
 DYNA_Q = TrainingConfig("dyna_q", 0.2, 0.9, 0.3, 0.97, planning_steps=2)
+SARSA = TrainingConfig("sarsa", 0.5, 0.9, 0.3, 0.97)
 MOST_ARGUMENTS = 64  # of a launch on a GPU
 
 
@@ -47,10 +54,7 @@ def assert_same(one: Colony, other: Colony) -> None:
     assert one.outcome() == other.outcome()
 
 
-@pytest.mark.parametrize(
-    "group",
-    [one if one in QUICK else pytest.param(one, marks=pytest.mark.slow) for one in drawing.GROUPS],
-)
+@pytest.mark.parametrize("group", MARKED)
 def test_drawn_colonies_have_the_recorded_hashes(group):
     (one,) = drawing.colonies_of(group, 1)
     name, drawn = one
@@ -78,18 +82,23 @@ def test_a_launch_has_few_arguments():
 
 
 def test_what_is_written_between_ticks_counts():
-    colony, expected = made(), made("by_world")
+    """Also an array with another shape: weights of a lower learning rate."""
+    colony, expected = (made(one, 200, SARSA) for one in (BY_ANT, "by_world"))
+    room = len(colony.arrays["weights"])
     for one in (colony, expected):
         one.tick(5)
         one.epsilon = 0.9
         one.next_actions[:, 0] = 1
-        one.set_learning_rate(0.01)
-        one.tick(5)
         one.tick(5)
         one.end_episode()
-        one.begin_episode(50, worlds.open_world(7, ranges=(8, 8, 8)))
-        one.tick(9)
+        one.begin_episode(50, worlds.open_world(7, ranges=(30,) * 3))
+        one.tick(5)
+        one._set_learning_rate(0.01)
+        one.tick(5)
     assert_same(colony, expected)
+    weights = colony.arrays["weights"]
+    assert len(weights) > room
+    assert np.array_equal(weights, expected.arrays["weights"])
 
 
 def test_copies_and_files_have_what_is_on_the_device(tmp_path):

@@ -38,7 +38,9 @@ def test_wrong_arguments_are_named(arguments, said):
     assert said in str(caught.value)
 
 
-@pytest.mark.parametrize("schedule", ["by_world", pytest.param("by_chunk", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "schedule", ["by_world", "by_ant", pytest.param("by_chunk", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("pheromone", [Pheromone(), Pheromone(diffusion=0.5)])
 def test_a_world_whose_episode_has_ended_stays_as_it_is(schedule, pheromone):
     """Trails too stand still, whatever the other worlds do."""
