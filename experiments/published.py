@@ -9,17 +9,20 @@ with ";" between them. Without the "!" that may follow COLUMN, the interval is l
 
 from __future__ import annotations
 
-import json
-import re
-import shutil
-from collections.abc import Sequence
-from dataclasses import asdict
-from pathlib import Path
+from taichi_ants.studies.interruption import stoppable
 
-from taichi_ants.analysis.tables import Table, plain_text
-from taichi_ants.errors import AntsError
-from taichi_ants.files import read_text, to_json, write_text
-from taichi_ants.studies.command_line import Parser, run_command
+with stoppable():  # Ctrl-C also works during these slow imports
+    import json
+    import re
+    import shutil
+    from collections.abc import Sequence
+    from dataclasses import asdict
+    from pathlib import Path
+
+    from taichi_ants.analysis.tables import Table, plain_text
+    from taichi_ants.errors import AntsError
+    from taichi_ants.files import read_text, to_json, write_text
+    from taichi_ants.studies.command_line import Parser, run_command
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES = ROOT / "docs" / "figures"

@@ -77,7 +77,7 @@ class Launch:
         self._renews = for_gpu or any(isinstance(value, ti.Ndarray) for value in values.values())
         if for_gpu:
             values = {**values, _ZERO: 0}
-        kind = _pack_type(tuple((name, *kind_of(value)) for name, value in values.items()))
+        kind = _pack_type(tuple((name, *type_of(value)) for name, value in values.items()))
         taichi = ti.lang.impl.get_runtime()
         program, kernel = taichi.prog, self._kernel_of(kind)._primal
         # `kind(**values)` would make two packs.
@@ -127,7 +127,7 @@ def has_guards(arguments: Any) -> bool:
 
 def on_device(array: np.ndarray) -> Any:
     """Return a copy of an array that stays in the memory of the device between launches."""
-    copy = ti.ndarray(getattr(ti, kind_of(array)[0]), array.shape)
+    copy = ti.ndarray(getattr(ti, type_of(array)[0]), array.shape)
     copy.taichi = ref(ti.lang.impl.get_runtime())
     with runtime.quiet():
         copy.from_numpy(array)
@@ -198,7 +198,7 @@ def _delete(taichi: ref, memory: Any) -> None:
         program.delete_argpack(memory)
 
 
-def kind_of(value: Any) -> tuple[str, int]:
+def type_of(value: Any) -> tuple[str, int]:
     """Return the name of a Taichi type, and the number of dimensions, 0 for a number."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype.kind}{8 * value.dtype.itemsize}", value.ndim

@@ -12,7 +12,12 @@ from command_lines import ROOT
 
 import taichi_ants
 from taichi_ants import Pheromone, Task, TrainingConfig
+from taichi_ants.features.rule import RULES
+from taichi_ants.learners.registry import LEARNERS
+from taichi_ants.measures.measure import MEASURES
 from taichi_ants.settings import declared
+from taichi_ants.task.observations.observation import OBSERVATIONS
+from taichi_ants.worlds.registry import WORLDS
 
 _PAGE = (ROOT / "docs" / "reference" / "api.md").read_text("utf-8")
 SETUP = next(
@@ -75,7 +80,9 @@ _SHOWN = {
 
 
 @pytest.mark.parametrize("name", _SHOWN.values())
-def test_the_example_of(name, names):
+def test_the_example_of(name, names, monkeypatch):
+    for registry in (LEARNERS, MEASURES, OBSERVATIONS, RULES, WORLDS):
+        monkeypatch.setattr(registry, "yours", dict(registry.yours))
     parser, runner = doctest.DocTestParser(), doctest.DocTestRunner(verbose=False)
     text, failures = inspect.getdoc(PUBLIC[name]), []
     example = parser.get_doctest(text, dict(names), name, None, 0)

@@ -121,7 +121,7 @@ def test_what_is_inside_another_leaves_the_end_to_it(capsys):
 
 SCRIPTS = (
     *("ant_system", "bridge", "colony", "compare", "findings", "fixed_rules", "gallery", "goss"),
-    *("hero", "learning", "offline", "policy_sheet", "utility"),
+    *("hero", "learning", "offline", "policy_sheet", "published", "utility"),
 )
 COMMANDS = (*SCRIPTS, "taichi-ants")
 COUNTING = """

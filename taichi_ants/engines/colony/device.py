@@ -11,7 +11,7 @@ import taichi as ti
 
 from taichi_ants import runtime
 from taichi_ants.engines.colony.memory import Contents, copies
-from taichi_ants.engines.launch import kind_of
+from taichi_ants.engines.launch import type_of
 from taichi_ants.errors import AntsError
 
 _LINE = 128  # an array begins at a multiple of this, as GPUs read memory in lines of 128 bytes
@@ -111,8 +111,8 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
         """Make memories with room for all numbers and arrays."""
         ours = {name: one for name, one in self._arrays.items() if name not in _OF_THREADS}
         self._contents = Contents(
-            tuple((name, kind_of(number)[0]) for name, number in numbers.items()),
-            tuple((name, *kind_of(array)) for name, array in ours.items()),
+            tuple((name, type_of(number)[0]) for name, number in numbers.items()),
+            tuple((name, *type_of(array)) for name, array in ours.items()),
         )
         ends = {kind: len(names) for kind, names in self._contents.heads().items()}
         self._places: dict[str, tuple[str, int]] = {}
