@@ -40,8 +40,8 @@ BEES = Table(
 
 def test_a_table_is_the_same_in_markdown_and_in_a_terminal() -> None:
     assert markdown(["Insects.", BEES]) == (
-        "Insects.\n\n**Bees**\n\n| Who | How<br>many |\n| --- | ---: |\n| a queen | 1<br>[1, 1] |\n\n"
-        "Counted once.  \nBy hand.\n"
+        "Insects.\n\n**Bees**\n\n| Who | How<br>many |\n| --- | ---: |\n"
+        "| a queen | 1<br>[1, 1] |\n\nCounted once.  \nBy hand.\n"
     )
     lines = plain_text(["Insects.", BEES], 40).splitlines()
     assert lines[:3] == ["Insects.", "", "Bees"]
