@@ -36,8 +36,14 @@ def program_and_lines(text: str) -> tuple[str, list[str]]:
     return "\n\n".join(parts), lines
 
 
-@pytest.mark.slow  # a process each, and some train
-@pytest.mark.parametrize("page", PAGES)
+# Scripts of models have tests of their own, see tests/examples/.
+MARKED = [
+    pytest.param(page, marks=pytest.mark.long if "models/" in page else pytest.mark.slow)
+    for page in PAGES
+]
+
+
+@pytest.mark.parametrize("page", MARKED)  # a process each, and some train
 def test_the_program_of_a_page_prints_what_the_page_says(page, kernels, tmp_path):
     program, lines = program_and_lines(PAGES[page])
     script = tmp_path / "page.py"  # a file, because rules and learners are read from their source

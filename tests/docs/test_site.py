@@ -29,7 +29,7 @@ def test_the_front_page_says_what_the_readme_says():
         assert " ".join(words.split()) in readme
 
 
-@pytest.mark.slow  # a minute
+@pytest.mark.long  # a minute
 def test_the_site_builds_and_its_links_lead_somewhere(tmp_path):
     pytest.importorskip("furo")
     options = ["-W", "--keep-going", "-q", "-d", str(tmp_path / "trees")]

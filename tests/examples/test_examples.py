@@ -58,7 +58,7 @@ def test_minari_data_learns_from_what_it_has_written(
     assert said == "58652 transitions; 20 of 20 rollouts deliver\n"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_search_resumes_and_ends_with_held_out_seeds(kernels: Path, tmp_path: Path) -> None:
     run("search", ["--trials", 1, "--journal", "stopped"], kernels, tmp_path)
     resumed = run("search", ["--trials", 2, "--journal", "stopped"], kernels, tmp_path)

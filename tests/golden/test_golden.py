@@ -66,7 +66,7 @@ def test_a_difference_names_what_differs():
     assert lines == ["a: differs in part 3 of 9, ticks 21 to 30 of 80"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_kernels_are_those_recorded():
     expected = kernels.recorded().get(kernels.version())
     if expected is None:

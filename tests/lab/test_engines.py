@@ -82,7 +82,8 @@ def test_kernels_agree(rules, learner, ask):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("world", "ants", "ticks"), [(1, 1000, 600), (2, 10_000, 120), (5, 64, 900)]
+    ("world", "ants", "ticks"),
+    [(1, 1000, 600), pytest.param(2, 10_000, 120, marks=pytest.mark.long), (5, 64, 900)],
 )
 def test_kernels_agree_about_crowds_and_drawn_worlds(world, ants, ticks, ask):
     radius = lab.WORLDS[world]["radius"]

@@ -129,7 +129,7 @@ def wait_for_blocks(process: subprocess.Popen, folder: Path) -> None:
     assert blocks_in(folder)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_killed_worker_costs_its_blocks_only(plain, kernels, tmp_path):
     pytest.importorskip("ray")
     (tmp_path / "my.toml").write_text(SWEEP)
