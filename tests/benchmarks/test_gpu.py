@@ -21,7 +21,9 @@ def run(*arguments, status=0):
     assert ended.value.code == status
 
 
-@pytest.mark.parametrize("case", ["environments", "training: double_q"])
+@pytest.mark.parametrize(
+    "case", [pytest.param("environments", marks=pytest.mark.slow), "training: double_q"]
+)
 def test_results_of_kernels_for_a_gpu_are_those_of_the_cpu(case, capsys):
     run("--on-cpu", "--only", case)
     assert f"{case}  equal\n" in capsys.readouterr().out

@@ -210,6 +210,7 @@ assert colony.schedule == "by_ant"
 """
 
 
+@pytest.mark.slow  # it compiles ten kernels
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 def test_compiled_for_a_gpu_no_product_is_fused_and_no_quotient_approximated(tmp_path):
     driver = Path(__file__).parents[1] / "support" / "fake_cuda.c"
