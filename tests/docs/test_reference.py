@@ -33,6 +33,7 @@ def generator():
     return generate
 
 
+REGISTRIES = LEARNERS, MEASURES, OBSERVATIONS, RULES, WORLDS
 GENERATE = generator()
 PUBLIC = {
     f"{module.__name__}.{name}": getattr(module, name)
@@ -44,6 +45,8 @@ OF_THE_PACKAGE = GENERATE.public_names(taichi_ants)
 
 def test_the_reference_is_made_from_the_declarations(monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
+    for registry in REGISTRIES:  # without what other tests have registered
+        monkeypatch.setattr(registry, "yours", {})
     pages = GENERATE.pages()
     assert len(pages) > 25
     old = [path.name for path, text in pages.items() if path.read_text("utf-8") != text]
@@ -81,7 +84,7 @@ _SHOWN = {
 
 @pytest.mark.parametrize("name", _SHOWN.values())
 def test_the_example_of(name, names, monkeypatch):
-    for registry in (LEARNERS, MEASURES, OBSERVATIONS, RULES, WORLDS):
+    for registry in REGISTRIES:
         monkeypatch.setattr(registry, "yours", dict(registry.yours))
     parser, runner = doctest.DocTestParser(), doctest.DocTestRunner(verbose=False)
     text, failures = inspect.getdoc(PUBLIC[name]), []
