@@ -26,7 +26,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.command_line import Parser, run_command
 
 ROOT = Path(__file__).parents[1]
-PAGE, SHOWN = (1200, 750), (960, 600)  # pixels: the window, and its picture
+PAGE, SHOWN = (1280, 800), (960, 600)  # pixels: the window, and its picture
 FPS, QUALITY = 20, 54
 PAUSE, STROKE, AFTER = 60, 24, 180  # ticks from lanes to the wall, of its stroke, after the detour
 LONGEST = 1500  # ticks after which a colony counts as one that found no detour

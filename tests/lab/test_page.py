@@ -431,10 +431,19 @@ def test_a_film_has_at_most_three_megabytes(opened):
 @pytest.mark.parametrize("address", ["", "#copies", "#bridge", "#daily"])
 def test_nothing_is_cut_off(opened, address):
     page = opened(address)
-    for width, height in SIZES.values():
+    for width, height in (
+        *SIZES.values(),
+        (760, 800),
+        (839, 800),
+        (840, 800),
+        (1200, 800),
+        (1260, 800),
+    ):
         page.tab.set_viewport_size({"width": width, "height": height})
         page.read(TWO_FRAMES)
         assert page.read("document.documentElement.scrollWidth") <= width
+        bar = "document.querySelector('.bar')"
+        assert page.read(f"{bar}.scrollWidth - {bar}.clientWidth") == 0, width
         assert page.read(CUT_OFF) == []
 
 
