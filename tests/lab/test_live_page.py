@@ -75,7 +75,8 @@ def test_a_visit_can_be_looked_back_at_continued_and_saved(tmp_path):
         tab.click("#copy-link")
         until(tab, "() => document.getElementById('toast').textContent.startsWith('Link copied')")
         address = tab.evaluate("location.href")
-        assert [event.does for event in lab.decoded(address.split("#")[1].split(";")[0])[1]][-1] == "trail"
+        _, events = lab.decoded(address.split("#")[1].split(";")[0])
+        assert events[-1].does == "trail"
         assert lab.replay(address).equal
         tab.click("#undo")  # the trail, then the wall
         tab.click("#undo")
