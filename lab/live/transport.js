@@ -16,7 +16,7 @@ function openTransport() {
 
 /* The page's own buttons: a visit is shared by its link, and goes on in the lab. */
 byId("files").insertAdjacentHTML("afterbegin", '<button type="button" class="text-button" id="copy-link" title="Copy a link that replays this visit up to now">Copy link</button>'
-  + '<button type="button" class="text-button" id="to-lab" title="Continue this visit in the lab">Open in the lab</button>');
+  + '<button type="button" class="text-button" id="to-lab" title="Continue this visit in the lab">Open in lab</button>');
 byId("to-lab").addEventListener("click", () => location.assign(`lab.html#${visit}`));
 byId("copy-link").addEventListener("click", async () => {
   window.history.replaceState(null, "", `#${visit}`);

@@ -5,7 +5,7 @@ import { GRID, LoneAnts } from "./engine.js";
 import { many } from "./story.js";
 
 const SEEDS = 100, EPISODES = 500, LAST = 100; // the paper's; results are means over the last episodes
-const MOST_WORKERS = 4, SMOOTH = 10;           // episodes that a point of a curve covers
+const SMOOTH = 10; // episodes that a point of a curve covers
 const NAMES = { q_learning: "Q-learning", sarsa: "SARSA", dyna_q: "Dyna-Q" };
 const nameOf = ({ learner, planningSteps }) => NAMES[learner] + (planningSteps ? `, ${planningSteps} planning steps` : "");
 const CHOICES = [["learner", "Learner"], ["truncates", "A delivery"], ["rate", "Learning rate"], ["discount", "Discount"],
@@ -88,7 +88,7 @@ export class Training {
   train(settings, done) {
     this.stop();
     const url = URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" }));
-    const count = Math.min(MOST_WORKERS, settings.length, navigator.hardwareConcurrency || 1);
+    const count = Math.min(settings.length, navigator.hardwareConcurrency || 1);
     this.workers = Array.from({ length: count }, () => new Worker(url));
     let next = 0, left = settings.length;
     const seeds = Array.from({ length: SEEDS }, (_, k) => k);
