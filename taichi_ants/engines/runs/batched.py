@@ -18,6 +18,7 @@ from taichi_ants.engines.layout import (
     unpack_cells,
 )
 from taichi_ants.engines.runs.engine import laid_out
+from taichi_ants.features import used_by
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.records import Snapshot
@@ -109,7 +110,9 @@ class BatchedEnvironments:
         self._arguments = {**self._joined, **self._numbers}
         numbers = {name: one for name, one in self._arguments.items() if isinstance(one, int)}
         self._names, self.arrays["numbers"][: len(numbers)] = tuple(numbers), [*numbers.values()]
-        self._of_steps = {name: one for name, one in self._arguments.items() if name not in numbers}
+        # Besides them, kernels for lone ants read only the probabilities of features.
+        read = {f"{name}_below" for one in used_by(self.task) for name in one.probabilities}
+        self._of_steps = {name: self._arguments[name] for name in ("memory", *sorted(read))}
 
     def seed(self, seeds: Sequence[int], which: np.ndarray) -> None:
         """Set the seeds of some ants, int (k,): new random streams and start cells."""
