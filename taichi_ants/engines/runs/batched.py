@@ -36,6 +36,7 @@ _OF_ANTS = (
 )
 _MOST_NUMBERS = 64  # that a step reads
 _SINGLE = False, 0  # the launch of a step, see `_launch`
+_STEP = int(Command.STEP)
 
 
 class BatchedEnvironments:
@@ -143,7 +144,7 @@ class BatchedEnvironments:
         These are its state and paper state, its result as in `arrays`, its reason, the number of
         deliveries, and its reward.
         """
-        self._given[0], self._given[1] = action, Command.STEP
+        self._given[0], self._given[1] = action, _STEP
         runtime.alone.acquire()  # `with` takes twice as long
         try:
             launch = self._launches.get(_SINGLE) or self._launch(*_SINGLE)
