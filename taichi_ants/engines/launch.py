@@ -39,7 +39,7 @@ class Launch:
     def __init__(self, kernel_of: Callable[[Any], Any]) -> None:
         self._kernel_of = kernel_of
         self._taichi: Any = lambda: None  # the Taichi runtime for which the launch was prepared
-        self._repeats = self._taichi  # the same, if the launch needs nothing else
+        self._repeats: Any = self._taichi  # the same, if the launch needs nothing else
         # Not a reference to its program, which would outlive a reset of Taichi.
         self._compiled: Any = None
         self._known: dict[str, Any] = {}  # the present values of the pack and the context
@@ -108,7 +108,7 @@ class Launch:
         self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
         self._known = dict.fromkeys(values)
         self._taichi = ref(taichi)
-        self._repeats = (lambda: None) if self._renews else self._taichi
+        self._repeats = self._taichi if not self._renews else lambda: None
 
     def _new_context(self) -> Any:
         """Return a context for launches with the pack, still without the arrays."""

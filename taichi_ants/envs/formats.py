@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, Literal, get_args
 
@@ -58,7 +58,7 @@ class ShownObservations:
         return flat
 
     @cached_property
-    def rows(self) -> Sequence[Any]:
+    def rows(self) -> Any:
         """The rows of `table`; as views, which take less time, unless there are too many."""
         return list(self.table) if len(self.table) <= _MOST_VIEWS else self.table
 
