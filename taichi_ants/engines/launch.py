@@ -12,6 +12,7 @@ from weakref import finalize, ref
 
 import numpy as np
 import taichi as ti
+from taichi.lang import impl
 from taichi.lang.argpack import ArgPack
 from taichi.types import ndarray_type
 
@@ -46,6 +47,7 @@ class Launch:
         self._kernel_of, self._changed, self._outputs = kernel_of, changed, outputs
         self._copies: dict[str, Any] = {}  # of NumPy arrays, on a GPU
         self._taichi: Any = lambda: None  # the Taichi runtime for which the launch was prepared
+        self._repeats: Any = self._taichi  # the same, if the launch needs nothing else
         # Not a reference to its program, which would outlive a reset of Taichi.
         self._compiled: Any = None
         self._known: dict[str, Any] = {}  # the present values of the pack and the context
@@ -53,7 +55,7 @@ class Launch:
 
     def __call__(self, values: Mapping[str, Any]) -> None:
         """Launch with these values; names and types are always the same, arrays C-contiguous."""
-        if self._taichi() is not ti.lang.impl.get_runtime():
+        if self._taichi() is not impl.get_runtime():
             runtime.start()  # the caller may have reset Taichi
             check_not_lost(values.values())
             self._prepare(values)
@@ -63,9 +65,13 @@ class Launch:
         self._launch()
 
     def repeat(self, values: Mapping[str, Any]) -> None:
-        """Launch with the values of the last launch, the same objects, without comparing them."""
-        if self._taichi() is ti.lang.impl.get_runtime():
-            self._launch()
+        """Launch with the values of the last launch, the same objects, without comparing them.
+
+        The kernel must compute with whole numbers only, because subnormal numbers are not flushed.
+        """
+        running = impl.get_runtime()
+        if self._repeats() is running:
+            running.prog.launch_kernel(self._compiled, self._context)
         else:
             self(values)
 
@@ -85,7 +91,7 @@ class Launch:
             for name, place in self._places.items():
                 _pass(self._context, place, self._on_device(name))
         with self._flushing:
-            ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
+            impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
         for name, copy in self._copies.items():
             if name in self._changed or (name in self._outputs and not self._leaves):
                 copy_out(copy, self._known[name])
@@ -110,7 +116,7 @@ class Launch:
         if for_gpu:
             values = {**values, _ZERO: 0}
         kind = _pack_type(tuple((name, *type_of(value)) for name, value in values.items()))
-        taichi = ti.lang.impl.get_runtime()
+        taichi = impl.get_runtime()
         program, kernel = taichi.prog, self._kernel_of(kind)._primal
         # `kind(**values)` would make two packs.
         self._pack = pack = _Pack(kind, dict(values))
@@ -134,6 +140,7 @@ class Launch:
         self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
         self._known = dict.fromkeys(values)
         self._taichi = ref(taichi)
+        self._repeats = self._taichi if not self._renews else lambda: None
 
     def _new_context(self) -> Any:
         """Return a context for launches with the pack, still without the arrays."""
@@ -159,7 +166,7 @@ def has_guards(arguments: Any) -> bool:
 
 def check_not_lost(values: Iterable[Any]) -> None:
     """Raise AntsError if Taichi was reset after one of the values came to the device."""
-    running = ti.lang.impl.get_runtime()
+    running = impl.get_runtime()
     if any(getattr(value, "taichi", lambda: running)() is not running for value in values):
         raise AntsError(
             "Taichi was reset, which destroys environments on a GPU; create them again."
@@ -215,7 +222,7 @@ class _Pack(ArgPack):
 
 def _delete(taichi: ref, memory: Any) -> None:
     """Delete the memory of a pack if its Taichi runtime is still active."""
-    running = ti.lang.impl.get_runtime()
+    running = impl.get_runtime()
     program = getattr(running, "prog", None)
     if taichi() is running and program is not None:
         program.delete_argpack(memory)
