@@ -24,7 +24,7 @@ from taichi_ants.reference.random_stream import hash_of
 from taichi_ants.task import Task, queueing
 from taichi_ants.worlds.lab import STEPS, WORLDS, distance, lab_world
 
-STROKES = ("rock", "food", "scent", "erase")
+STROKES = ("rock", "food", "scent", "erase", "", "trail")
 SETTINGS = ("ants", "epsilon", "rate", "discount", "level", "shaping", "learns")
 LEARNERS = ("q_learning", "sarsa", "frozen")
 RULES, DIRECTED, QUEUES = (*range(8), 15), 1, 8
@@ -218,6 +218,8 @@ def _changes(event: Event, scene: dict[str, Any], colony: Colony) -> Iterator[ch
             yield changes.Place(event.does, cells_within(event, colony.grid))
         case "scent":
             yield changes.SetTrail((scene["level"] + 1) // 2, cells_within(event, colony.grid))
+        case "trail":
+            yield changes.SetTrail(scene["level"], cells_within(event, colony.grid))
         case "erase":
             yield changes.Clear(cells_within(event, colony.grid))
             yield changes.SetTrail(0, cells_within(event, colony.grid))
