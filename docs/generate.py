@@ -12,6 +12,8 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields, is_dataclass
+from functools import cached_property
 from importlib import import_module
 from inspect import isclass, isfunction, ismodule
 from pathlib import Path
@@ -235,6 +237,70 @@ def public_names(module: Any) -> list[str]:
     return [n for n in names if not n.startswith("_") and not ismodule(getattr(module, n))]
 
 
+# Members of public classes that only the package uses: pages leave them out, and they may change.
+INTERNAL = {
+    "Caste": "pheromones_laid",
+    "Choice": "needs_table own_rule weights",
+    "ColonyEpisodes": "measured of_world",
+    "Every": "check",
+    "Field": "counts_without_food numbers",
+    "Interventions": "set_task state stream",
+    "Intervention": "check check_in",
+    "Learner": "memory_for settings",
+    "Measure": "check_state computed label uses_iqm",
+    "Move": "check",
+    "Observation": "ahead",
+    "Parameters": "entry_named",
+    "Pheromone": "darkest decay fades_after lasting numbers own_deposit own_evaporation share",
+    "Place": "check check_in",
+    "ProtocolEvent": "check times",
+    "ReferenceColony": "add castes fill new_ant observe table_of",
+    "Rewards": "by_event largest",
+    "Rollouts": "measured",
+    "Run": "of_colony of_lone_ant",
+    "SetLearningRate": "check_in",
+    "SetTask": "as_dict changed check check_in converted",
+    "SetTrail": "check_in",
+    "Setting": "replace",
+    "TickingColony": "reset_worlds",
+    "ColonyState": "nbytes next_actions streams tables_of_ants",
+    "Recording": "to_bytes",
+    "Dataset": "described facts",
+    "Settings": "check converted entry_named named uses",
+    "ShorthandSettings": "as_dict converted facts from_dict replace",
+    "Snapshot": "ordered",
+    "Task": "all_cues ants_change check cues_of food_changes needs_table number_of numbers own_reward"
+    " own_rules pheromones_while sees uses",
+    "Threshold": "converted exists",
+    "Tidy": "columns measured",
+    "Traffic": "shared",
+    "TrainingConfig": "least_epsilon least_learning_rate next_epsilon next_learning_rate",
+    "TrainingResult": "measured",
+    "When": "check",
+    "World": "closer first_starts nests_of uses",
+    "_OfAnts": "check",
+}
+
+
+_MEMBERS = (classmethod, staticmethod, property, cached_property)
+
+
+def public_members(kind: type) -> dict[str, Any]:
+    """Return the methods and properties of a class that its page describes, by name."""
+    hidden = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
+    hidden |= {*getattr(kind, "_fields", ())}
+    found: dict[str, Any] = {}
+    for base in kind.__mro__:
+        if not base.__module__.startswith("taichi_ants."):
+            continue
+        hidden |= {*INTERNAL.get(base.__name__, "").split()} - found.keys()
+        for name, value in vars(base).items():
+            is_member = callable(value) or isinstance(value, _MEMBERS)
+            if is_member and name[0] != "_" and name not in hidden:
+                found.setdefault(name, value)
+    return found
+
+
 # Data of the package, whose values have no docstrings.
 DATA = {
     "BUILT_IN": "The measures of the package by name, see [measures](../measures.md).",
@@ -261,7 +327,8 @@ def api(module: str, seen: dict[int, str]) -> str:
             elsewhere.append(f"{{py:obj}}`{seen[id(value)]}`")
         else:
             seen[id(value)] = f"{name}.{public}"
-            more = ["   :members:"] if isclass(value) else []
+            members = ", ".join(public_members(value)) if isclass(value) else ""
+            more = [f"   :members: {members}"] if members else []
             here += [f".. auto{'class' if isclass(value) else 'function'}:: {public}", *more, ""]
     lines = [f"# {name}", "", (found.__doc__ or "").strip().replace("::\n", ":\n"), ""]
     if elsewhere:

@@ -31,6 +31,10 @@ if TYPE_CHECKING:
     from taichi_ants.grid.hexgrid import AxialGrid
     from taichi_ants.worlds.world import World
 
+__all__ = [
+    "AddAnts", "Clear", "Episode", "Intervention", "Move", "Place", "RemoveAnts", "SetAnts",
+    "SetEpsilon", "SetLearningRate", "SetTask", "SetTrail", "from_dict",
+]  # fmt: skip
 One = TypeVar("One", bound="ShorthandSettings")
 _MOST = 2**24  # ants, see `arguments.MAX_ANTS`
 _CELLS = Setting("cells, each [x, y, z], or the name of a region", or_region=True)

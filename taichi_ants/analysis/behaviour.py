@@ -16,6 +16,7 @@ from taichi_ants.task.constants import N_STATES, RIGHT, SEES_CUE
 if TYPE_CHECKING:
     from taichi_ants.engines.runs.results import Trace
 
+__all__ = ["BEHAVIOURS", "classify"]
 # A behaviour is an index into this list.
 BEHAVIOURS = ("delivers", "walks the trail", "circles with food", "other")
 DELIVERS, WALKS, CIRCLES, OTHER = range(len(BEHAVIOURS))

@@ -26,6 +26,7 @@ from taichi_ants.worlds.world import World
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
+__all__ = ["EpisodeBounds", "ExpectedEpisode"]
 # About a minute on one core, and 2 GB of memory.
 MAX_STATES = 2_000_000
 # The cost of a step in the search for the shortest delivery. It is above twice the rewards of any

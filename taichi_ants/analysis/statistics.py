@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+__all__ = ["bootstrap_interval", "interquartile_mean", "student_interval"]
 RESAMPLES = 40_000
 RANDOM_SEED = 20_250_801
 # Differences of means of integers carry rounding errors of about 1e-15 of their size.

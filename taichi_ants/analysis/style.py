@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import XAxis, YAxis
     from matplotlib.figure import Figure
 
+__all__ = ["use"]
 # 9 inches are about 900 pixels, the width of a README; the DPI doubles that for sharp screens.
 WIDTH = 9.0
 DPI = 180

@@ -18,6 +18,7 @@ from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Life
 from taichi_ants.task.constants import N_ACTIONS
 
+__all__ = ["HexColonyParallelEnv", "parallel_env"]
 Infos = dict[str, dict[str, Any]]  # by agent and name
 
 

@@ -23,6 +23,10 @@ from taichi_ants.task import Choice, Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
 
+__all__ = [
+    "Policy", "action_probabilities", "frozen_policy", "load_policy", "random_policy",
+    "save_policy", "trail_follower",
+]  # fmt: skip
 ActionValues = npt.NDArray[np.float32]
 _KIND = Kind("policy", 2, "save_policy", most=1 << 26)
 

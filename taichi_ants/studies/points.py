@@ -67,7 +67,7 @@ class Drawn:
         cls, preset: str, first: int = 0, regions: Mapping[str, Any] | None = None, **settings: Any
     ) -> Drawn:
         """Return the worlds that `worlds.build(preset, first + seed, **settings)` draws."""
-        for declared in worlds.settings_of(preset) if preset in worlds.names() else ():
+        for declared in worlds.registry.settings_of(preset) if preset in worlds.names() else ():
             if declared.name in settings:  # so that equal numbers of other types are equal
                 settings[declared.name] = declared.checked(settings[declared.name])
         return cls(json.dumps([preset, first, settings, regions or {}], sort_keys=True))

@@ -208,7 +208,7 @@ def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:
         known = [s._replace(path=s.name) for s in declared(of) if not s.is_group]
     else:
         preset = fixed.get("world.preset", "paper")
-        of_world = worlds.settings_of(preset) if preset in worlds.names() else ()
+        of_world = worlds.registry.settings_of(preset) if preset in worlds.names() else ()
         known = [*all_of(Task), *declared(TrainingConfig), *of_world]
         for named in named_groups(Task):
             entry = re.match(rf"{named.path}\.([^.]+)\.", path)
@@ -237,7 +237,7 @@ def _world(kind: str, settings: Settings) -> Any:
     if per_seed not in ((True, False) if kind == "colony" else (False,)):
         refuse("world.per_seed", per_seed, "true or false for kind 'colony', else left out")
     if per_seed or first is not None:
-        worlds.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
+        worlds.registry.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
     first = checked_whole("world.seed", first or 0, -(2**62), 2**62)
     if per_seed:
         return Drawn.by(preset, first, regions, **settings)

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from taichi_ants.errors import checked_whole
 from taichi_ants.task.constants import N_STATES, SEES_CUE, SEES_GOAL
 
+__all__ = ["CELL_LETTERS", "REACHABLE_STATES", "TASK_NAMES", "state_from_index", "state_name"]
 # Indexed by `carries`; letters are then indexed by code.
 TASK_NAMES: tuple[str, str] = ("foraging", "carrying")
 CELL_LETTERS: tuple[str, str] = ("EOTF", "EOSQ")

@@ -163,7 +163,7 @@ class Recorder:
             "kinds of food": ", ".join(task.foods),
         }
         if self._learns:
-            lines["learner"] = learners.label(config.learner)
+            lines["learner"] = learners.registry.label(config.learner)
             groups = {"nest": colony.n_nests, "caste": len(task.castes)}
             parts = " and ".join(name for name, n in groups.items() if n > 1)
             shared = f"one per {parts}" if parts else "shared"
