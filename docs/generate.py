@@ -257,6 +257,7 @@ INTERNAL = {
     "ReferenceColony": "add castes fill new_ant observe table_of",
     "Rewards": "by_event largest",
     "Rollouts": "measured",
+    "Rule": "result",
     "Run": "of_colony of_lone_ant",
     "SetLearningRate": "check_in",
     "SetTask": "as_dict changed check check_in converted",
@@ -269,8 +270,8 @@ INTERNAL = {
     "Settings": "check converted entry_named named uses",
     "ShorthandSettings": "as_dict converted facts from_dict replace",
     "Snapshot": "ordered",
-    "Task": "all_cues ants_change check cues_of food_changes needs_table number_of numbers own_reward"
-    " own_rules pheromones_while sees uses",
+    "Task": "all_cues ants_change check cues_of food_changes needs_table number_of numbers sees"
+    " own_reward own_rules pheromones_while uses",
     "Threshold": "converted exists",
     "Tidy": "columns measured",
     "Traffic": "shared",
@@ -285,8 +286,10 @@ INTERNAL = {
 _MEMBERS = (classmethod, staticmethod, property, cached_property)
 
 
-def public_members(kind: type) -> dict[str, Any]:
+def public_members(kind: Any) -> dict[str, Any]:
     """Return the methods and properties of a class that its page describes, by name."""
+    if not isclass(kind):
+        return {}
     hidden = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
     hidden |= {*getattr(kind, "_fields", ())}
     found: dict[str, Any] = {}
@@ -303,10 +306,17 @@ def public_members(kind: type) -> dict[str, Any]:
 
 # Data of the package, whose values have no docstrings.
 DATA = {
+    "At": "The start of the memory of a run: the offsets `table`, `floats` and `integers`, i32.",
+    "BEHAVIOURS": "The behaviours of `classify` in words; a behaviour is an index.",
     "BUILT_IN": "The measures of the package by name, see [measures](../measures.md).",
+    "CELL_LETTERS": "The letters of codes, of an ant without food and of one with food.",
     "KINDS": "The kinds of rules by name, with their results and [inputs](../rule_inputs.md).",
     "LEARNERS": "The learners of the reference by name, in plain Python.",
     "OBSERVATIONS": "The observations of the reference by name, in plain Python.",
+    "REACHABLE_STATES": "The 100 indices of states that can occur under the rules, ascending.",
+    "TASK_NAMES": "The words for the load of an ant without food and of one with food.",
+    "Transition": "A step of an ant: `state`, `action`, `next_state`, `next_action` (-1 if none was"
+    " drawn), `terminated` and `truncated`, i32, and `reward`, f32.",
     "PAUSE": "Seconds for which an animation shows its last picture.",
 }
 
@@ -321,13 +331,13 @@ def api(module: str, seen: dict[int, str]) -> str:
     here, elsewhere, data = [], [], []
     for public in sorted(public_names(found), key=str.lower):
         value = getattr(found, public)
-        if public in DATA:
+        if public in DATA and not isclass(value):
             data.append(f"`{public}`\n: {DATA[public]}\n")
         elif id(value) in seen:
             elsewhere.append(f"{{py:obj}}`{seen[id(value)]}`")
         else:
             seen[id(value)] = f"{name}.{public}"
-            members = ", ".join(public_members(value)) if isclass(value) else ""
+            members = ", ".join(public_members(value))
             more = [f"   :members: {members}"] if members else []
             here += [f".. auto{'class' if isclass(value) else 'function'}:: {public}", *more, ""]
     lines = [f"# {name}", "", (found.__doc__ or "").strip().replace("::\n", ":\n"), ""]

@@ -391,6 +391,9 @@ class Settings:
         """Return the settings with changes; settings that lose their effect get their defaults.
 
         To change a group, give a mapping of its settings; its entry "" is the value to start from.
+
+        >>> Pheromone("exponential", half_life=30).replace(diffusion=0.1).half_life
+        30.0
         """
         for setting in declared(type(self)):
             name = setting.name
@@ -408,7 +411,11 @@ class Settings:
 
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
-        """Return the settings in a mapping, checked; groups are mappings or names."""
+        """Return the settings in a mapping, checked; groups are mappings or names.
+
+        >>> Task.from_dict({"observation": "ants", "pheromone": {"level": 300}}).pheromone.level
+        300
+        """
         return cls(**cls._required(facts)).replace(**facts)
 
     @classmethod

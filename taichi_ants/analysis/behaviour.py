@@ -28,6 +28,10 @@ def classify(trace: Trace, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
 
     Behaviours are indices into `BEHAVIOURS`, int8 (m,); returns are int64 (m,). An episode without
     a delivery has `max_steps` steps.
+
+    >>> behaviours, returns = classify(rollout(worlds.paper(), result.q_values[0, 0]), 600)
+    >>> BEHAVIOURS[behaviours[0]] in BEHAVIOURS, returns.shape
+    (True, (1,))
     """
     episode = np.asarray(trace.episodes) - trace.episodes[0]
     late = np.asarray(trace.steps) >= max_steps // 2

@@ -56,7 +56,11 @@ def label(name: str) -> str:
 
 
 def use() -> None:
-    """Apply the style of the project to all figures of a notebook."""
+    """Apply the style of the project to all figures of a notebook.
+
+    >>> from taichi_ants.analysis import style
+    >>> style.use()
+    """
     from matplotlib import rcParams
 
     rcParams.update({**_settings(), "figure.figsize": (8.0, 3.0), "figure.dpi": 110})

@@ -176,6 +176,11 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         task: See `HexForageEnv`; without births and lifespan.
         start, max_steps: See `HexColonyParallelEnv`.
         others: See `HexForageEnv`; `render` draws each ant's world.
+
+    >>> ants = gymnasium.make_vec("taichi_ants/HexColony-v0", num_envs=8, ants=4)
+    >>> seen, infos = ants.reset(seed=0)
+    >>> ants.step(np.ones(8, int))[1].shape  # the reward of each ant
+    (8,)
     """
 
     def __init__(

@@ -47,6 +47,14 @@ class HexColonyParallelEnv(ParallelEnv):
         possible_agents: All agents that can live in an episode: the ants at the start and those
             that can be born, see `most_births`.
         agents: The living agents, after the first reset.
+
+    >>> from taichi_ants.envs import colony_v0
+    >>> env = colony_v0.parallel_env(ants=4, render_mode="rgb_array")
+    >>> seen, infos = env.reset(seed=0)
+    >>> actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+    >>> seen, rewards, terminated, truncated, infos = env.step(actions)
+    >>> env.observation_space("ant_0").contains(seen["ant_0"]), env.render().shape
+    (True, (720, 1280, 3))
     """
 
     metadata: ClassVar[dict] = {**METADATA, "name": "colony_v0", "is_parallelizable": True}

@@ -145,6 +145,14 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         max_steps: The number of steps after which an episode is truncated.
         observation_format: "cells", "index" or "one_hot".
         render_mode: "rgb_array" for pictures, uint8 (720, 1280, 3), or None.
+
+    >>> env = gymnasium.make("taichi_ants/HexForage-v0", render_mode="rgb_array")
+    >>> seen, info = env.reset(seed=0)
+    >>> seen, reward, terminated, truncated, info = env.step(1)  # forward
+    >>> envs.Event(info["event"]).name, envs.Reason(info["reason"]).name
+    ('ENTERED_CUE', 'NONE')
+    >>> env.unwrapped.action_masks().tolist(), env.render().shape
+    ([True, True, True, False, False], (720, 1280, 3))
     """
 
     metadata = METADATA
@@ -265,6 +273,12 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
             i has entry i modulo n.
         autoreset_mode: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
         others: See `HexForageEnv`; `render` draws all worlds.
+
+    >>> ants = gymnasium.make_vec("taichi_ants/HexForage-v0", num_envs=4)
+    >>> seen, infos = ants.reset(seed=0)
+    >>> seen, rewards, terminated, truncated, infos = ants.step(np.array([0, 1, 2, 3]))
+    >>> ants.rollout("trail_follower", steps=50).rewards.shape
+    (50, 4)
     """
 
     _ants: LoneAnts

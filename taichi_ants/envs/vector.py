@@ -264,6 +264,12 @@ class AntVectorEnv(VectorEnv[Any, Any, Any]):
         """Return the world of each environment, as a picture, or None.
 
         Ants that share a world also share its picture.
+
+        >>> name = "taichi_ants/HexForage-v0"
+        >>> ants = gymnasium.make_vec(name, num_envs=2, render_mode="rgb_array")
+        >>> seen, infos = ants.reset(seed=0)
+        >>> len(ants.render())
+        2
         """
         if self.render_mode is None:
             return None

@@ -50,7 +50,11 @@ class Policy(NamedTuple):
 
 
 def random_policy(observation: str = "paper") -> ActionValues:
-    """Return the policy that takes each of the five actions with equal probability."""
+    """Return the policy that takes each of the five actions with equal probability.
+
+    >>> random_policy().shape
+    (128, 5)
+    """
     return np.zeros((observations.get(observation).n_states, N_ACTIONS), np.float32)
 
 
@@ -61,6 +65,9 @@ def action_probabilities(
 
     Epsilon-greedy probabilities are exactly as in kernels. Probabilities of the rule "softmax" can
     differ from those in kernels by rounding.
+
+    >>> action_probabilities(np.array([0, 1, 1, 0, 0]), epsilon=0.5).tolist()
+    [0.1, 0.35, 0.35, 0.1, 0.1]
     """
     explores = np.floor(epsilon * 2.0**32) / 2.0**32
     if choice is not None and (weights := choice.weights(q_values)) is not None:
@@ -105,6 +112,9 @@ def trail_follower(observation: str = "paper") -> ActionValues:
     until that ant pushes it along the trail. With the observation `queues`, it moves against that
     ant instead of waiting, and waits behind an ant that is further up the trail (p). Only the
     observations in `FOLLOWED` have rules.
+
+    >>> trail_follower("ants").shape
+    (432, 5)
     """
     check_one_of("observation", observation, FOLLOWED)
     name_of, q_values = observations.get(observation).name_of, random_policy(observation)
@@ -146,6 +156,9 @@ def frozen_policy(
 
     Raises:
         AntsError: There is no such policy for this observation, or the file cannot be used.
+
+    >>> (frozen_policy("trail_follower", "ants") == trail_follower("ants")).all().item()
+    True
     """
     expect(name, name_or_path, str, os.PathLike)
     name_or_path = os.fspath(name_or_path)

@@ -43,6 +43,9 @@ def batch_q_learning(
 
     Raises:
         AntsError: An argument is not allowed.
+
+    >>> offline.batch_q_learning(data, sweeps=5).shape
+    (128, 5)
     """
     expect("data", data, Dataset)
     runs = np.arange(len(data.seeds) + 1) if by_run else [0, len(data.seeds)]
@@ -68,6 +71,9 @@ def fitted_q_iteration(
     learning, JMLR 6, 2005) with a table as regression, which fits the mean target of each pair of
     state and action. The order of the data does not matter. Pairs without data keep `initial_q`.
     Arguments and errors are those of `batch_q_learning`; the discount must be at most 0.9999.
+
+    >>> offline.fitted_q_iteration(data).argmax(axis=-1).shape  # the best action in each state
+    (128,)
     """
     model = _model(data, by_run)
     q = model.solve(discount, model.rewards, initial_q)
@@ -91,6 +97,10 @@ def pessimistic_q_iteration(
     Args:
         penalty: From 0 to 1e9, in units of reward. Other arguments and errors are those of
             `fitted_q_iteration`.
+
+    >>> cautious, hopeful = offline.pessimistic_q_iteration(data), offline.fitted_q_iteration(data)
+    >>> (cautious <= hopeful + 1e-4).all().item()
+    True
     """
     model = _model(data, by_run)
     worst = data.task.rewards.by_event()[Event.ENTERED_EMPTY :].min()
@@ -114,6 +124,11 @@ class EmpiricalModel:
         begins: int32 (pairs + 1,), the index of the first successor of each pair, then of the end.
         successors: int32 (k,), states, ascending in a pair; none for transitions that terminated.
         probabilities: float64 (k,); for a pair that may terminate, their sum is less than 1.
+
+    >>> every_episode = np.ones((1, len(data.begins) - 1), int)
+    >>> model = offline.EmpiricalModel.of(data, every_episode)
+    >>> model.solve(0.9, model.rewards, initial_q=0.0).shape
+    (1, 128, 5)
     """
 
     n_states: int

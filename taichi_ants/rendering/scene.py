@@ -105,6 +105,11 @@ class Scene:
 
     Raises:
         AntsError: An argument is of the wrong kind, or the size is not allowed.
+
+    >>> snapshot = rendering.at_start(worlds.paper())
+    >>> scene = rendering.Scene(snapshot.grid, size=(640, 360), title="The paper's world")
+    >>> scene.draw(snapshot, rendering.Status([("step", "0")])).shape
+    (360, 640, 3)
     """
 
     def __init__(

@@ -18,7 +18,11 @@ from taichi_ants.worlds.world import World
 
 
 def paper() -> World:
-    """Return the paper's world: 271 cells, one food item, and a trail along the whole x axis."""
+    """Return the paper's world: 271 cells, one food item, and a trail along the whole x axis.
+
+    >>> worlds.paper().foods.tolist()
+    [[9, 0, 0]]
+    """
     return World(
         ranges=(10, 10, 10),
         queen=(0, 9, 9),
@@ -46,6 +50,10 @@ def register(name: str, builder: Builder) -> None:
     arguments except `seed` need defaults. A builder with an argument `seed` gets a whole number and
     must return the same world for the same number. Raises AntsError if the name is not a word or
     belongs to a built-in world, or if an argument has no default.
+
+    >>> worlds.register("small", lambda seed=0: worlds.open_world(seed, ranges=(8, 8, 8)))
+    >>> worlds.build("small", seed=3).ranges
+    (8, 8, 8)
     """
     WORLDS.check_new(name)
     for argument in _arguments(builder).values():

@@ -88,6 +88,10 @@ class Colony(TickingColony):
             every: Read the measures also every n ticks, before the events of the tick.
             protocol: Events with interventions, see `taichi_ants.protocol`. They happen in each
                 episode, which begins without the changes of the one before.
+
+        >>> episodes = colony.run(episodes=2, ticks=100, measures=["deliveries"], every=50)
+        >>> episodes.deliveries.shape, len(episodes.series.ticks)
+        ((2, 1), 4)
         """
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)

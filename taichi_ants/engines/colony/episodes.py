@@ -65,7 +65,11 @@ class ColonyEpisodes(Record, Tidy):
         return counts
 
     def counts(self) -> dict[str, np.ndarray]:
-        """Return the arrays of all counts of worlds by name."""
+        """Return the arrays of all counts of worlds by name.
+
+        >>> sorted(colony.run(1, 100).counts())[:3]
+        ['births', 'blocked', 'carried']
+        """
         arrays = (item for item in vars(self).items() if isinstance(item[1], np.ndarray))
         return {name: array for name, array in arrays if array.ndim == 2}
 

@@ -300,7 +300,12 @@ class ColonyState:
         return rewards
 
     def outcome(self) -> ColonyEpisodes:
-        """Return the results of the episode so far, arrays (1, W); AntsError if a value is NaN."""
+        """Return the results of the episode so far, arrays (1, W); AntsError if a value is NaN.
+
+        >>> colony.tick(100)
+        >>> colony.outcome().ticks.item()
+        100
+        """
         self._check_finite()
         return self._results()
 
@@ -317,7 +322,11 @@ class ColonyState:
         return ColonyEpisodes(**copies, seeds=self.seeds)
 
     def snapshot(self, world: int = 0) -> Snapshot:
-        """Return the present state of world number `world`; arrays are copies."""
+        """Return the present state of world number `world`; arrays are copies.
+
+        >>> colony.snapshot().ant_cells.shape
+        (16,)
+        """
         self._check_begun()
         w = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
         slots, levels = self.living[w], {}
@@ -716,6 +725,10 @@ class ColonyState:
         """Return a colony that `save` wrote.
 
         AntsError if the file cannot be used, or its learner or observation is not registered.
+
+        >>> colony.save("colony.npz")
+        >>> Colony.load("colony.npz") == colony
+        True
         """
         running = runtime.start(threads, arch)  # first: its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):

@@ -104,7 +104,12 @@ class TrainingResult(Record, Tidy):
 
     @classmethod
     def load(cls, path: PathLike) -> TrainingResult:
-        """Return a result that `save` wrote; its learners need not be registered."""
+        """Return a result that `save` wrote; its learners need not be registered.
+
+        >>> result.save("result.npz")
+        >>> TrainingResult.load("result.npz") == result
+        True
+        """
         with _KIND.reading(path) as (arrays, facts):
             task = Task.from_dict(facts["task"])
             outcomes: dict[str, Any] = {name: arrays[name] for name in OUTCOMES}
