@@ -159,7 +159,7 @@ def _foraging(snapshot: Any) -> float:
 LABOUR = Feature(
     Labour,
     arrays=(
-        Array("idle", ANT, "i1", "idle", "bool", "idle", "yes, no"),
+        Array("idle", ANT, "i1", "idle", "bool", "idle", "yes, no", doc="Whether the ant is idle"),
         Array("threshold", ANT, "f4", "thresholds", "f4", "response threshold", unit=_UNIT),
         Array("stimulus", NEST, "f8", "stimuli", "f8", "stimulus", unit=_UNIT),
     ),

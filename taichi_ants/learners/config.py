@@ -144,7 +144,7 @@ class TrainingConfig(Settings, path="training"):
 
     @property
     def planning_steps(self) -> int:
-        """The hyperparameter of this name, or 0: updates from a model after each step."""
+        """The number of updates from a model after each step, which is a hyperparameter; else 0."""
         return int(dict(self.hyperparameters).get("planning_steps", 0))
 
     def as_dict(self) -> dict[str, Any]:

@@ -326,7 +326,7 @@ class Task(Settings, path="task"):
 
     @property
     def cues(self) -> tuple[str, ...]:
-        """The names of all cues by number: the trail, fields; others from -1, the compass."""
+        """The names of all cues by number, the trail and fields first; -1 is the compass."""
         return (*self.pheromones, *reversed(CUES))
 
     def number_of(self, cue: str) -> int:

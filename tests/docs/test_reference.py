@@ -112,6 +112,17 @@ def test_every_public_callable_has_an_example():
     assert without == []
 
 
+def test_the_docstrings_of_properties_are_sentences_with_the_right_type(names):
+    exec(COLONY, names)
+    for public in filter(inspect.isclass, PUBLIC.values()):
+        for name, member in GENERATE.public_members(public).items():
+            if isinstance(member, PROPERTIES):
+                text = inspect.getdoc(member)
+                assert ": " not in text.partition("\n\n")[0], name  # which is a type for Sphinx
+                kind = re.search(r"\b(u?int\d+|float\d+|bool) \(W", text)
+                assert not kind or getattr(names["colony"], name).dtype == kind[1], name
+
+
 PROPERTIES = property, cached_property
 _BY_ID = {
     id(value): (name, value)

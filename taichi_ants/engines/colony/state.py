@@ -92,15 +92,15 @@ def _view_of(array: Array) -> property:
         shape = len(state.seeds), state.sizes[array.per]
         entries = state.arrays.get(array.name, state.arrays.get(array.instead))
         if entries is None or entries.size != math.prod(shape):
-            entries = np.zeros(shape)
+            entries = np.zeros(shape, array.dtype)
         entries = entries.reshape(shape)
         return entries.astype(array.shown_as) if array.shown_as else entries
 
     kind = np.dtype(array.shown_as or array.dtype)
     places = {ANT: "capacity", NEST: "nests", CELL: "grid.size"}.get(array.per, array.per)
-    about = array.doc or array.words.capitalize()
+    about = array.doc or f"{array.words.capitalize()}{f', in {array.unit}' if array.unit else ''}"
     return property(
-        read, doc=f"{about}: {kind} (W, {places}){'' if array.shown_as else ', a view'}."
+        read, doc=f"{about}, {kind} (W, {places}){'' if array.shown_as else ', a view'}."
     )
 
 
@@ -122,10 +122,6 @@ class ColonyState:
         ready: bool (W,), whether an episode has begun, and each change of it was completed.
         delivered: int64 (W,), food items delivered in previous episodes.
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
-
-    Properties show the arrays in `layout.COLUMNS`, as writable views or as copies; those (W,
-    capacity) hold what belongs to the last ant in the slot. Arrays of features are 0 in colonies
-    without the feature.
     """
 
     if TYPE_CHECKING:  # the views of arrays, see below
@@ -212,23 +208,23 @@ class ColonyState:
 
     running = property(
         lambda colony: colony.arrays["worlds"][WorldRow.RUNNING] == 1,
-        doc="Whether the episode of each world is still running: bool (W,).",
+        doc="Whether the episode of each world is still running, bool (W,).",
     )
     episode_ticks = property(
         lambda colony: colony.arrays["worlds"][WorldRow.TICKS],
-        doc="Ticks since the episode of each world began: int32 (W,), a view.",
+        doc="Ticks since the episode of each world began, int32 (W,), a view.",
     )
     deliveries = property(
         lambda colony: colony.arrays["worlds"][WorldRow.DELIVERIES],
-        doc="Deliveries of the present episode: int32 (W,), a view.",
+        doc="Deliveries of the present episode, int32 (W,), a view.",
     )
     living = property(
         lambda colony: colony._stages == Stage.LIVING,
-        doc="Whether an ant lives in each slot: bool (W, capacity).",
+        doc="Whether an ant lives in each slot, bool (W, capacity).",
     )
     queen_cells = property(
         lambda colony: colony._of_nests(NestRow.QUEEN_CELL),
-        doc="Flat indices of the cells of queens: int32 (W, nests), a view.",
+        doc="Flat indices of the cells of queens, int32 (W, nests), a view.",
     )
     streams = _view_of(Array("streams", ANT, "u8", doc="State of the random stream"))
 

@@ -87,7 +87,7 @@ class Observation:
 
     @property
     def parts(self) -> tuple[int, ...]:
-        """The number of values of each part of a state index: `shape`, or (n_states,)."""
+        """The number of values of each part of a state index, `shape` or (n_states,)."""
         return self.shape or (self.n_states,)
 
     @property
