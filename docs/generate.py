@@ -22,13 +22,19 @@ from unittest import mock
 
 DOCS = Path(__file__).parent
 REFERENCE = DOCS / "reference"
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent), str(DOCS.parent / "experiments")]
+
+import columns  # noqa: E402
 
 import taichi_ants  # noqa: E402
 from taichi_ants import envs, learners, measures, rules, task, worlds  # noqa: E402, F401
 from taichi_ants.commands import COMMANDS  # noqa: E402
+from taichi_ants.measures.finished import FINISHED  # noqa: E402
+from taichi_ants.protocol import EVENTS  # noqa: E402
 from taichi_ants.settings import Named, declared  # noqa: E402
 from taichi_ants.studies import command_line  # noqa: E402
+from taichi_ants.studies.columns import NAMES, SWEEP  # noqa: E402
+from taichi_ants.studies.sweep_file import KEYS, KINDS, WORLD_KEYS  # noqa: E402
 from taichi_ants.task import observations  # noqa: E402
 
 
@@ -90,16 +96,7 @@ def listed(registry: str) -> str:
             ),
         )  # fmt: skip
     if registry == "learners":
-        kinds = [learners.get(name) for name in learners.names()]
-        return table(
-            ("Name", "What it is", "Hyperparameters", "Can share a table"),
-            (
-                [f"`{one.name}`", one.summary,
-                 ", ".join(f"`{s.name}`" for s in declared(one.hyperparameters)) or "none",
-                 "yes" if one.td_error else "no"]
-                for one in kinds
-            ),
-        )  # fmt: skip
+        return "\n\n".join(map(learner, learners.names()))
     return table(
         ("Name", "Reads", "Unit", "Meaning"),
         (
@@ -108,6 +105,59 @@ def listed(registry: str) -> str:
             for one in measures.BUILT_IN.values()
         ),
     )  # fmt: skip
+
+
+def learner(name: str) -> str:
+    """Return the update of a learner, as its module describes it, and what it declares."""
+    one = learners.get(name)
+    about = import_module(f"taichi_ants.learners.{name}").__doc__ or ""
+    hyperparameters = one.hyperparameters()
+    memory = one.memory(hyperparameters, 128)
+    tables = {0: "one table", 1: "two tables"}.get(memory.tables, f"{memory.tables + 1} tables")
+    numbers = memory.floats + memory.integers
+    own = [f"`{setting.name}`" for setting in declared(one.hyperparameters)]
+    facts = (
+        ("Hyperparameters", ", ".join(own) or "none"),
+        ("Draws the next action before the update", "yes" if one.draws_next_action else "no"),
+        ("Memory for 128 states", tables + (f", and {numbers} numbers" if numbers else "")),
+        ("Ants can share a table", "yes" if one.td_error else "no"),
+    )
+    return f"### `{name}`\n\n{about.strip()}\n\n" + table(("Property", "Value"), facts)
+
+
+def measures_of(kind: str) -> str:
+    """Return the measures of finished runs of a kind."""
+    rows = ([f"`{one.name}`", one.unit, one.summary] for one in FINISHED[kind].values())
+    return table(("Measure", "Unit", "Meaning"), rows)
+
+
+def tables(command: str) -> str:
+    """Return the tables that a command writes, with all their columns."""
+    if command == "names":
+        rows = ([f"`{name}`", meaning] for name, (_, meaning) in NAMES.items())
+        return table(("In a name", "Stands for"), rows)
+    every = SWEEP if command == "sweep" else getattr(columns, command.upper())
+    return "\n\n".join(
+        f"### `{name}` of `{command}`\n\nIt has a row for each {one.row}.\n\n"
+        + table(("Column", "Meaning"), ([f"`{c}`", about] for c, about in one.columns.items()))
+        for name, one in every.items()
+    )
+
+
+def sweep_keys(part: str) -> str:
+    """Return the keys of sweep files: "file", "world", "events", or those of a kind of point."""
+    if part == "events":
+        rows = [[f"`[[{name}]]`", kind.__doc__.split("\n\n")[0]] for name, kind in EVENTS.items()]
+    elif part in KINDS:
+        own = [one for one in declared(KINDS[part]) if one.name not in KEYS]
+        rows = ([f"`{one.name}`", *one.in_words] for one in own)
+        return table(("Key", "Values", "Default", "Meaning"), rows)
+    else:
+        rows = [
+            [f"`{name}`", about]
+            for name, about in {"file": KEYS, "world": WORLD_KEYS}[part].items()
+        ]
+    return table(("Key", "Meaning"), rows)
 
 
 def inputs(kind: str) -> str:
@@ -196,7 +246,10 @@ MAKERS: dict[str, Callable[[str], str]] = {
     "list": listed,
     "inputs": inputs,
     "commands": commands,
+    "measures": measures_of,
     "spaces": spaces,
+    "sweep": sweep_keys,
+    "tables": tables,
 }
 _BLOCK = re.compile(r"(<!-- generated: (\w+) (\S+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -275,7 +328,7 @@ INTERNAL = {
     "Threshold": "converted exists",
     "Tidy": "columns measured",
     "Traffic": "shared",
-    "TrainingConfig": "least_epsilon least_learning_rate next_epsilon next_learning_rate",
+    "TrainingConfig": "least_learning_rate next_epsilon next_learning_rate",
     "TrainingResult": "measured",
     "When": "check",
     "World": "closer first_starts nests_of uses",

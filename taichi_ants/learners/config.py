@@ -113,7 +113,7 @@ class TrainingConfig(Settings, path="training"):
 
     @property
     def least_epsilon(self) -> float:
-        """The epsilon at which decay ends: the smaller of `min_epsilon` and `epsilon`."""
+        """The epsilon at which decay ends, the smaller of `min_epsilon` and `epsilon`."""
         return min(self.min_epsilon, self.epsilon)
 
     @property
