@@ -73,7 +73,7 @@ ODD = {
     ),
     "two runs": lambda _: rollout(WORLD, train(WORLD, CONFIG, range(2), 1)),
     "two policies": lambda _: rollout(WORLD, np.zeros((2, 128, 5))),
-    "a world's name": lambda _: places.check_seed_counts(LONG),
+    "a world's name": lambda _: places.registry.check_seed_counts(LONG),
 }
 
 
