@@ -390,6 +390,8 @@ class Episode(Intervention, path="episode"):
 def from_dict(facts: Any) -> Intervention:
     """Return the intervention of a mapping from its name to its settings or its short form.
 
+    The names are the keys of `At`, such as "remove_ants".
+
     >>> from_dict({"remove_ants": {"share": 0.5}}) == from_dict({"remove_ants": 0.5})
     True
     """

@@ -277,13 +277,18 @@ class _Documentation:
     def __get__(self, _: object, cls: type) -> str:
         if not _is_ready(cls) or not declared(cls):
             return self._text
-        lines = [cleandoc(self._text), "", "Attributes:"]
-        for setting in declared(cls):
-            values, default, meaning = setting.in_words
-            absent = default if default == "required" else f"default: {default}"
-            line = f"{setting.name}: {meaning}; {values} ({absent})."
-            lines.append(fill(line, 100, initial_indent=" " * 4, subsequent_indent=" " * 8))
-        return "\n".join(lines)
+        return _described(self._text, "Attributes", declared(cls))
+
+
+def _described(text: str, heading: str, settings: Iterable[DeclaredSetting]) -> str:
+    """Return a docstring, followed by settings as they are declared."""
+    lines = [cleandoc(text), "", f"{heading}:"]
+    for setting in settings:
+        values, default, meaning = setting.in_words
+        absent = default if default == "required" else f"default: {default}"
+        line = f"{setting.name}: {meaning}; {values} ({absent})."
+        lines.append(fill(line, 100, initial_indent=" " * 4, subsequent_indent=" " * 8))
+    return "\n".join(lines)
 
 
 class Settings:
@@ -530,6 +535,8 @@ def checked(function: Function, path: str = "world") -> Function:
         }
         return function(**arguments)
 
+    if "Args:" not in (text := function.__doc__ or ""):
+        calls.__doc__ = _described(text, "Args", declared(function))
     return calls  # type: ignore[return-value]
 
 

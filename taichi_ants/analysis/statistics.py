@@ -138,8 +138,15 @@ def bootstrap_interval(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the bootstrap interval of the mean over seeds (expanded BCa) or the IQM (percentiles).
 
-    Both ends are float64 (rows,), for values (rows, seeds), or (seeds,) for a single row. They are
-    nan for fewer than two seeds and for rows with a nan, and equal if all seeds of a row are.
+    Args:
+        values: float (rows, seeds), or (seeds,) for a single row.
+        level: The probability with which the interval covers the true value, 0 to 1.
+        resamples: The number of resamples of the seeds.
+        iqm: Whether it is the interval of the interquartile mean.
+
+    Returns:
+        The lower and the upper ends, float64 (rows,). They are nan for fewer than two seeds and for
+        rows with a nan, and equal if all seeds of a row are.
 
     >>> low, high = bootstrap_interval(np.arange(10))
     >>> low.round(1), high.round(1)
@@ -163,6 +170,8 @@ def student_interval(
     values: np.ndarray, level: float = 0.95, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return Student's t interval of the mean over seeds; with `iqm`, Tukey and McLaughlin's.
+
+    Arguments and results are those of `bootstrap_interval`, but values have two dimensions.
 
     >>> low, high = student_interval(np.arange(10)[None])
     >>> low.round(1), high.round(1)

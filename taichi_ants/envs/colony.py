@@ -175,7 +175,7 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         ants: The number of ants in each world.
         task: See `HexForageEnv`; without births and lifespan.
         start, max_steps: See `HexColonyParallelEnv`.
-        others: See `HexForageEnv`; `render` draws each ant's world.
+        world, observation_format, render_mode: See `HexForageEnv`; `render` draws each ant's world.
 
     >>> ants = gymnasium.make_vec("taichi_ants/HexColony-v0", num_envs=8, ants=4)
     >>> seen, infos = ants.reset(seed=0)

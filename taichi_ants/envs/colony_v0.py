@@ -41,7 +41,7 @@ class HexColonyParallelEnv(ParallelEnv):
         capacity: The largest number of living ants; by default, `ants`, or 2 * `ants` + 64 if the
             task has births.
         max_steps: The number of steps of an episode.
-        others: See `HexForageEnv`.
+        world, task, observation_format, render_mode: See `HexForageEnv`.
 
     Attributes:
         possible_agents: All agents that can live in an episode: the ants at the start and those

@@ -272,7 +272,8 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         world: See `HexForageEnv`; or a list of n worlds with the same ranges, of which environment
             i has entry i modulo n.
         autoreset_mode: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
-        others: See `HexForageEnv`; `render` draws all worlds.
+        task, delivery, max_steps, observation_format, render_mode: See `HexForageEnv`; `render`
+            draws all worlds.
 
     >>> ants = gymnasium.make_vec("taichi_ants/HexForage-v0", num_envs=4)
     >>> seen, infos = ants.reset(seed=0)

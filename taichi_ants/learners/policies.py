@@ -50,7 +50,7 @@ class Policy(NamedTuple):
 
 
 def random_policy(observation: str = "paper") -> ActionValues:
-    """Return the policy that takes each of the five actions with equal probability.
+    """Return the policy for an observation that takes all five actions with equal probability.
 
     >>> random_policy().shape
     (128, 5)
@@ -61,7 +61,12 @@ def random_policy(observation: str = "paper") -> ActionValues:
 def action_probabilities(
     q_values: np.ndarray, epsilon: float = 0.0, choice: Choice | None = None
 ) -> np.ndarray:
-    """Return the probabilities of actions, float64 (..., 5); by default of epsilon-greedy ones.
+    """Return the probabilities of actions, float64 (..., 5), in states with given action values.
+
+    Args:
+        q_values: float (..., 5), action values.
+        epsilon: The exploration rate, 0 to 1.
+        choice: The rule of choice; None for epsilon-greedy ants.
 
     Epsilon-greedy probabilities are exactly as in kernels. Probabilities of the rule "softmax" can
     differ from those in kernels by rounding.
@@ -152,7 +157,10 @@ def frozen_policy(
 ) -> ActionValues:
     """Return a policy without learning by its name, or the policy in a file (.npz).
 
-    Messages call it `name`.
+    Args:
+        name_or_path: "trail_follower", "random", or the path of a file.
+        observation: The name of the observation of the ants that follow it.
+        name: The name of the argument in messages.
 
     Raises:
         AntsError: There is no such policy for this observation, or the file cannot be used.

@@ -80,7 +80,7 @@ class Measure:
         return next(iter(numbers.values()))
 
     def read(self, snapshot: Any) -> dict[str, float]:
-        """Return the value in a state, or its parts, by their full names.
+        """Return the value in a snapshot of a world, or its parts, by their full names.
 
         Raises:
             AntsError: The function fails or returns something else, or the part does not exist.

@@ -133,7 +133,7 @@ class Dataset(Record):
         return self._take(np.arange(len(self)) - first < checked_whole("transitions", transitions))
 
     def of_run(self, run: int) -> Dataset:
-        """Return the data of one seed, which keeps its number; AntsError if it has no data.
+        """Return the data of one run by its number, which it keeps; AntsError if there are none.
 
         >>> data.of_run(0).seeds
         (0,)

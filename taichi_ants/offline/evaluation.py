@@ -118,8 +118,11 @@ def model_based(
 
     This is the direct method (Jiang and Li, Doubly robust off-policy value evaluation for
     reinforcement learning, ICML 2016). Its variance is small, but it is biased for any amount of
-    data if states are not Markov. Each resample has a separate model. Pairs of state and action
-    without data have the value `initial_q`. Other arguments are those of `importance_sampling`.
+    data if states are not Markov. Each resample has a separate model.
+
+    Args:
+        initial_q: The value of pairs of state and action without data.
+        data, q_values, discount, epsilon, resamples, level: As in `importance_sampling`.
 
     >>> bool(np.isfinite(offline.model_based(data, result.q_values[0, 0], resamples=0).value))
     True

@@ -28,7 +28,9 @@ CaptionedSnapshot = tuple[Snapshot, Status]
 
 
 def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
-    """Return a world with n ants, or none, at the start; raises as `World.start` does.
+    """Return a snapshot of a world at the start, with n ants or none, placed by the seed.
+
+    Raises as `World.start` does.
 
     >>> rendering.at_start(worlds.paper(), n=3).ant_cells.shape
     (3,)
@@ -57,7 +59,10 @@ def frames(
 ) -> Iterator[np.ndarray]:
     """Yield pictures of snapshots of one world, uint8 (height, width, 3), one by one.
 
-    `size` is width and height in pixels; `look` are further arguments of `Scene`.
+    Args:
+        snapshots: Pairs of a `Snapshot` and its `Status`, or None, as `colony_snapshots` yields.
+        size: Width and height in pixels.
+        look: Further arguments of `Scene`.
 
     >>> pictures = rendering.frames(rendering.colony_snapshots(colony), size=(320, 240))
     >>> next(pictures).shape
@@ -74,17 +79,21 @@ def frames(
 class Episode:
     """An episode in which an ant follows a policy: rollout 0 of a seed.
 
+    Attributes:
+        trace: Its steps.
+        name: Its name in the panel of pictures, such as "greedy".
+
     >>> episode = rendering.Episode.play(worlds.paper(), result.q_values[0, 0])
     >>> len([*episode.snapshots()]) == len(episode.trace) + 1
     True
     """
 
     trace: Trace
-    name: str  # in the panel
+    name: str
 
     @classmethod
     def play(cls, world: World, q_values: np.ndarray, **rules: Any) -> Episode:
-        """Return rollout 0 of a policy; `rules` and errors are those of `rollout`."""
+        """Return rollout 0 of a policy; arguments and errors are those of `rollout`."""
         name = f"epsilon {rules['epsilon']:g}" if rules.get("epsilon") else "greedy"
         return cls(rollout(world, q_values, **rules), name)
 

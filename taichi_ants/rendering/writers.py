@@ -99,7 +99,7 @@ def save_animation(
 
 
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
-    """Write a picture, uint8 (height, width, 3), as PNG.
+    """Write a picture to a PNG file; a `frame` is uint8 (height, width, 3).
 
     Raises:
         AntsError: The file does not end in .png, or is not writable.

@@ -29,7 +29,7 @@ def exp(x: float) -> float:
 
 
 def log(x: float) -> float:
-    """Return the natural logarithm of a normal number above 0; ValueError for other numbers.
+    """Return the natural logarithm of x, a normal number above 0; ValueError for other numbers.
 
     >>> rules.log(8.0) / rules.log(2.0)
     3.0

@@ -20,7 +20,7 @@ CELL_LETTERS: tuple[str, str] = ("EOTF", "EOSQ")
 
 
 def state_from_index(index: int) -> tuple[bool, int, int, int]:
-    """Return whether the ant carries food, and the codes left, forward and right, for 0 to 127.
+    """Return the load and the codes left, forward and right of a state, by its index, 0 to 127.
 
     >>> states.state_from_index(8)
     (False, 0, 2, 0)
@@ -33,7 +33,7 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
     """Return a function that names states of n cells in view by the letters of their codes."""
 
     def name_of(row: int) -> str:
-        """Return the name of a state by its index.
+        """Return the name of a state by its index, which is the row of a table.
 
         >>> states.state_name(8)
         'foraging E T E'

@@ -332,12 +332,13 @@ def record_colony(
     follow: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
-    """Return a recording of a colony's next ticks; other arguments are those of `Recorder`.
+    """Return a recording of a colony's next ticks.
 
     Args:
         colony: A colony in an episode; it advances by `ticks`.
         ticks: The number of ticks; 0 records only the present.
         frame_interval: Ticks between frames; only 1 records the action of each ant.
+        title, follow: As in `Recorder`.
         progress: Called after each frame with the completed share of the work.
 
     Raises:

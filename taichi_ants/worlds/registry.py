@@ -92,8 +92,13 @@ def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
 def build(name_or_path: str | os.PathLike[str], seed: int = 0, **settings: Any) -> World:
     """Return the world with a registered name or, if there is none, of a map file.
 
-    The seed is any whole number, which only some builders use; `settings` are those of the world.
-    Raises AntsError if neither the name nor the file exists.
+    Args:
+        name_or_path: A name, see `names`, or the path of a map file, see `load_map`.
+        seed: Any whole number; only worlds that are drawn at random use it.
+        settings: The settings of the world by name, such as `ranges`.
+
+    Raises:
+        AntsError: Neither the name nor the file exists, or a setting is not allowed.
 
     >>> worlds.build("open", seed=3).ranges
     (10, 18, 53)

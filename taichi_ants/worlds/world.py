@@ -131,7 +131,7 @@ class World:
         return replace(self, regions={**self.regions, **by_name}) if by_name else self
 
     def region(self, name: str) -> np.ndarray:
-        """Return the flat indices of the cells of a region; AntsError if there is none."""
+        """Return the flat indices of the cells of a region by name; AntsError if there is none."""
         if name not in self.regions:
             known = ", ".join(self.regions) or "none"
             raise AntsError(
@@ -142,6 +142,8 @@ class World:
 
     def ground(self) -> np.ndarray:
         """Return EMPTY, OBSTACLE (also outside), FOOD or QUEEN by cell, uint8 (grid.size,).
+
+        They are constants in `taichi_ants.task.constants`.
 
         >>> from taichi_ants.task.constants import FOOD
         >>> (worlds.paper().ground() == FOOD).sum().item()
@@ -179,7 +181,9 @@ class World:
         return levels
 
     def distances(self, nest: int = 0) -> np.ndarray:
-        """Return the steps to a queen without obstacles, int32 (grid.size,); 0 outside.
+        """Return the steps to the queen of a nest without obstacles, int32 (grid.size,).
+
+        Those outside the world are 0. Nests are numbered from 0.
 
         >>> world = worlds.paper()
         >>> world.distances()[world.grid.index((9, 0, 0))].item()
@@ -196,6 +200,8 @@ class World:
 
     def walkable(self, starts: np.ndarray) -> np.ndarray:
         """Return the empty cells within reach of empty cells in `starts`, bool (grid.size,).
+
+        `starts` are flat indices of cells.
 
         >>> world = worlds.paper()
         >>> world.walkable(world.start(seed=0)[0]).sum().item()

@@ -112,6 +112,22 @@ def test_every_public_callable_has_an_example():
     assert without == []
 
 
+def test_every_argument_is_described():
+    missing, known = [], {"facts", "path", "more", "named", "title", "values"}
+    for full, public in PUBLIC.items():
+        members = GENERATE.public_members(public).items()
+        for name, value in ((full, public), *((f"{full}.{name}", v) for name, v in members)):
+            text = inspect.getdoc(value) or ""
+            is_elsewhere = re.search(r"[Aa]rguments\b[^.]* are those of", text)
+            if is_elsewhere or isinstance(value, PROPERTIES) or full.rpartition(".")[2] in SHOWN_BY:
+                continue
+            value = getattr(value, "__func__", value)
+            arguments = {*inspect.signature(value).parameters} if callable(value) else set()
+            arguments -= {"self", "cls", "args", "kwargs"} | known
+            missing += [f"{name}: {a}" for a in arguments if not re.search(rf"\b{a}\b", text)]
+    assert missing == []
+
+
 def test_the_docstrings_of_properties_are_sentences_with_the_right_type(names):
     exec(COLONY, names)
     for public in filter(inspect.isclass, PUBLIC.values()):

@@ -718,7 +718,7 @@ class ColonyState:
         *,
         arch: str | None = None,
     ) -> State:
-        """Return a colony that `save` wrote.
+        """Return a colony that `save` wrote; `threads` and `arch` are those of `train`.
 
         AntsError if the file cannot be used, or its learner or observation is not registered.
 
