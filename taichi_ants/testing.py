@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -163,8 +163,8 @@ def _colonies(task: Task, seed: int) -> tuple[Colony, ReferenceColony]:
     """Return a drawn colony and its reference at the start of an episode."""
     world = _world(seed)
     learner = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 1.0) if task.needs_table else None
-    sharing = "frozen" if learner is None else "shared"
-    schedule = ("by_world", "by_chunk")[seed % 2]
+    sharing: Any = "frozen" if learner is None else "shared"
+    schedule: Any = ("by_world", "by_chunk")[seed % 2]
     colony = Colony(world, task, learner, seed, 12, sharing=sharing, schedule=schedule)
     plain = ReferenceColony(world, task, learner, seed, 12, sharing=sharing)
     colony.begin_episode(TICKS)

@@ -15,6 +15,7 @@ from taichi_ants.envs.vector import (
     Ants,
     AntVectorEnv,
     Arguments,
+    RenderMode,
     Rules,
     Step,
     Worlds,
@@ -192,7 +193,7 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         start: str = "nest",
         max_steps: int = MAX_STEPS,
         observation_format: ObservationFormat = "cells",
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
     ) -> None:
         n, ants = checked_whole("num_envs", num_envs), checked_whole("ants", ants)
         if n % ants:

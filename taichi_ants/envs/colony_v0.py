@@ -12,7 +12,7 @@ from pettingzoo.utils.env_logger import EnvLogger
 
 from taichi_ants.envs.colony import MAX_STEPS, ColonyWorlds
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.vector import METADATA, Arguments, Place, Rules
+from taichi_ants.envs.vector import METADATA, Arguments, Place, RenderMode, Rules
 from taichi_ants.errors import shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Life
@@ -68,7 +68,7 @@ class HexColonyParallelEnv(ParallelEnv):
         capacity: int | None = None,
         max_steps: int = MAX_STEPS,
         observation_format: ObservationFormat = "cells",
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
     ) -> None:
         arguments = Arguments(world, task, max_steps, observation_format, render_mode)
         self._worlds = ColonyWorlds(1, arguments, ants, start, capacity)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import gymnasium
 import numpy as np
@@ -23,6 +23,7 @@ from taichi_ants.envs.vector import (
     AntVectorEnv,
     Arguments,
     Place,
+    RenderMode,
     Rules,
     Step,
     Worlds,
@@ -40,7 +41,8 @@ __all__ = ["HexForageEnv", "HexForageVectorEnv", "Rollout"]
 
 _WHOLE = (int, np.int64)  # the types of most actions
 SUPPORTS = LONE - CHOICE - {"choice.rule=softmax"}  # actions are given
-DELIVERIES = ("terminates", "truncates", "continues")
+Delivery = Literal["terminates", "truncates", "continues"]
+DELIVERIES: tuple[str, ...] = get_args(Delivery)
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
 _NUMBERS_OF_ANT = 24  # at least those in `BatchedEnvironments` beside the cells
@@ -162,10 +164,10 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         self,
         world: Place = "paper",
         task: Rules | None = None,
-        delivery: str | None = None,
+        delivery: Delivery | None = None,
         max_steps: int = EPISODE_STEPS,
         observation_format: ObservationFormat = "cells",
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
     ) -> None:
         arguments = Arguments(world, task, max_steps, observation_format, render_mode)
         self._ants = LoneAnts(1, delivery, arguments)
@@ -289,10 +291,10 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         num_envs: int = 1,
         world: Worlds = "paper",
         task: Rules | None = None,
-        delivery: str | None = None,
+        delivery: Delivery | None = None,
         max_steps: int = EPISODE_STEPS,
         observation_format: ObservationFormat = "cells",
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     ) -> None:
         n = checked_whole("num_envs", num_envs)

@@ -191,3 +191,9 @@ def test_help_and_editors_know_the_settings(kind):
     code = f"from taichi_ants import {kind.__name__}\n{kind.__name__}("
     [seen] = jedi.Script(code).get_signatures()
     assert {one.name for one in settings} <= {one.name for one in seen.params}
+
+
+def test_editors_know_the_views_of_a_colony():
+    code = "from taichi_ants import Colony, worlds\ncolony = Colony(worlds.paper())\ncolony."
+    seen = {one.name for one in jedi.Script(code).complete()}
+    assert {*GENERATE.public_members(taichi_ants.Colony)} <= seen

@@ -125,8 +125,27 @@ class ColonyState:
     """
 
     if TYPE_CHECKING:  # the views of arrays, see below
-
-        def __getattr__(self, name: str) -> np.ndarray: ...
+        _stages: np.ndarray
+        actions: np.ndarray
+        ages: np.ndarray
+        carried: np.ndarray
+        carrying: np.ndarray
+        caste_deliveries: np.ndarray
+        castes: np.ndarray
+        cells: np.ndarray
+        events: np.ndarray
+        executed: np.ndarray
+        food_kinds: np.ndarray
+        headings: np.ndarray
+        idle: np.ndarray
+        kinds: np.ndarray
+        nests: np.ndarray
+        next_actions: np.ndarray
+        numbers: np.ndarray
+        paper_states: np.ndarray
+        states: np.ndarray
+        stimuli: np.ndarray
+        thresholds: np.ndarray
 
     def __init__(
         self,
@@ -138,18 +157,19 @@ class ColonyState:
         capacity: int | None = None,
         start: Start = "nest",
         ends_at_delivery: bool = False,
-        sharing: str = "shared",
+        sharing: Sharing = "shared",
         q_values: np.ndarray | None = None,
         threads: int | None = None,
         *,
         arch: str | None = None,
-        schedule: str | None = None,
+        schedule: Literal["by_world", "by_chunk", "by_ant"] | None = None,
     ) -> None:
         self.task = task = arguments.checked_task(task, "a colony", SUPPORTS)
         self.capacity = arguments.checked_capacity(task, ants, capacity, start, ends_at_delivery)
         self.ants, self.start, self.ends_at_delivery = int(ants), start, bool(ends_at_delivery)
         check_one_of("sharing", sharing, SHARINGS)
-        self.sharing, self.learns = sharing, sharing != "frozen"
+        self.sharing: str = sharing
+        self.learns = sharing != "frozen"
         given = arguments.checked_training(training, task, sharing, q_values is not None)
         self.has_training, self.training = given is not None, given or _NO_TRAINING
         self.is_given_actions = task.needs_table and not self.has_training
