@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, Literal, get_args
 
 import gymnasium
 import numpy as np
@@ -24,6 +24,7 @@ from taichi_ants.envs.vector import (
     AntVectorEnv,
     Arguments,
     Place,
+    RenderMode,
     Rules,
     Step,
     Worlds,
@@ -41,7 +42,8 @@ __all__ = ["HexForageEnv", "HexForageVectorEnv", "Rollout"]
 
 _WHOLE = (int, np.int64)  # the types of most actions
 SUPPORTS = LONE - CHOICE - {"choice.rule=softmax"}  # actions are given
-DELIVERIES = ("terminates", "truncates", "continues")
+Delivery = Literal["terminates", "truncates", "continues"]
+DELIVERIES: tuple[str, ...] = get_args(Delivery)
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
 _NUMBERS_OF_ANT = 24  # at least those in `BatchedEnvironments` beside the cells
@@ -150,6 +152,14 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         max_steps: The number of steps after which an episode is truncated.
         observation_format: "cells", "index" or "one_hot".
         render_mode: "rgb_array" for pictures, uint8 (720, 1280, 3), or None.
+
+    >>> env = gymnasium.make("taichi_ants/HexForage-v0", render_mode="rgb_array")
+    >>> seen, info = env.reset(seed=0)
+    >>> seen, reward, terminated, truncated, info = env.step(1)  # forward
+    >>> envs.Event(info["event"]).name, envs.Reason(info["reason"]).name
+    ('ENTERED_CUE', 'NONE')
+    >>> env.unwrapped.action_masks().tolist(), env.render().shape
+    ([True, True, True, False, False], (720, 1280, 3))
     """
 
     metadata = METADATA
@@ -159,10 +169,10 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         self,
         world: Place = "paper",
         task: Rules | None = None,
-        delivery: str | None = None,
+        delivery: Delivery | None = None,
         max_steps: int = EPISODE_STEPS,
         observation_format: ObservationFormat = "cells",
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
     ) -> None:
         arguments = Arguments(world, task, max_steps, observation_format, render_mode)
         self._ants = LoneAnts(1, delivery, arguments)
@@ -315,7 +325,14 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         world: See `HexForageEnv`; or a list of n worlds with the same ranges, of which environment
             i has entry i modulo n.
         autoreset_mode: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
-        others: See `HexForageEnv`; `render` draws all worlds.
+        task, delivery, max_steps, observation_format, render_mode: See `HexForageEnv`; `render`
+            draws all worlds.
+
+    >>> ants = gymnasium.make_vec("taichi_ants/HexForage-v0", num_envs=4)
+    >>> seen, infos = ants.reset(seed=0)
+    >>> seen, rewards, terminated, truncated, infos = ants.step(np.array([0, 1, 2, 3]))
+    >>> ants.rollout("trail_follower", steps=50).rewards.shape
+    (50, 4)
     """
 
     _ants: LoneAnts
@@ -325,10 +342,10 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         num_envs: int = 1,
         world: Worlds = "paper",
         task: Rules | None = None,
-        delivery: str | None = None,
+        delivery: Delivery | None = None,
         max_steps: int = EPISODE_STEPS,
         observation_format: ObservationFormat = "cells",
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     ) -> None:
         n = checked_whole("num_envs", num_envs)

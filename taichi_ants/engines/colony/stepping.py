@@ -99,6 +99,10 @@ class TickingColony(ColonyState):
 
         Raises:
             AntsError: A world is not allowed.
+
+        >>> colony.begin_episode()
+        >>> colony.ticks
+        0
         """
         fresh = copy.copy(self)
         fresh.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
@@ -185,6 +189,12 @@ class TickingColony(ColonyState):
         Actions are whole numbers 0 to 4 (W, capacity): left, forward, right, pick up, give. Those
         of vacant slots and of worlds whose episode has ended are ignored. AntsError if no episode
         has started, the colony has a training, or an action is not allowed.
+
+        >>> given = Colony(worlds.paper(), ants=4, sharing="frozen")
+        >>> given.begin_episode()
+        >>> given.act(np.ones((1, 4), int))  # forward
+        >>> given.rewards.tolist()
+        [[1, -1, -1, 0]]
         """
         self._check_begun()
         if not self.is_given_actions:
@@ -200,7 +210,12 @@ class TickingColony(ColonyState):
         self._advance(1)
 
     def end_episode(self) -> None:
-        """End the episode: save random streams for the next one, and decay epsilon and the rate."""
+        """End the episode: save random streams for the next one, and decay epsilon and the rate.
+
+        >>> colony.end_episode()
+        >>> colony.epsilon
+        0.099
+        """
         self._check_finite()
         self._keep_streams()
         epsilon = self.training.next_epsilon(self.epsilon)
