@@ -41,6 +41,7 @@ extensions = [
 exclude_patterns = ["lessons/class"]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 default_role = "py:obj"
+highlight_language = "none"  # commands and what they print; Python blocks name their language
 
 # Pages. Notebooks hold their results, so that building the site runs nothing.
 nb_execution_mode = "off"
