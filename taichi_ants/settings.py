@@ -547,10 +547,9 @@ def all_of(cls: Any) -> Iterator[DeclaredSetting]:
 
 def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
     """Return the end of a message about an unknown name, with the most similar known names."""
-    names = list(known)
+    names, sought = list(known), str(name).lower()
     # Longer names are similar by chance.
-    near = difflib.get_close_matches(str(name).lower(), names, 3, 0.6 if len(str(name)) < 9 else 0.75)
-    near = near or names
+    near = difflib.get_close_matches(sought, names, 3, 0.6 if len(sought) < 9 else 0.75) or names
     of = f" of {group}" if group else ""
     if not near:
         return f"is not a setting{of}, which has none; leave it out."

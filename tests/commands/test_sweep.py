@@ -193,7 +193,11 @@ WRONG = {
         ["per_seed is True", "for kind 'colony'"],
     ),
     "for colonies": ("[vary]", "[vary]\ntask.life.regrowth = [1]", ["use a Colony"]),
-    "against": ("[task]", "[against]\ntask.rewards.shaping = 7\n[task]", ["task.rewards.shaping = 7;", "[vary]"]),
+    "against": (
+        "[task]",
+        "[against]\ntask.rewards.shaping = 7\n[task]",
+        ["against is task.rewards.shaping = 7; ", "[vary]"],
+    ),
     "margin alone": ("seeds =", "margin = 1\nseeds =", ["which margin requires"]),
     "value twice": ("[1, 0]", "[1, 1]", ["task.rewards.shaping has 1 more than once"]),
     "few episodes": ("episodes = 50", "episodes = 49", ["return_last50 needs 50 episodes"]),
