@@ -93,14 +93,18 @@ def split_attributes(app: Any, what: str, name: str, value: Any, options: Any, l
         lines[:] = (text[:start] + attributes).split("\n")
 
 
+def keep_anchors(app: Any, page: str, source: list[str]) -> None:
+    """Let links to places in the lab keep their ends, `#home`, which MyST drops without `path:`."""
+    source[0] = re.sub(rf"\]\((?=[./]*(?:{'|'.join(APPS)})[#?])", "](path:", source[0])
+
+
 def link_apps(app: Any, doctree: nodes.document) -> None:
     """Make links to the lab and the article links, not downloads."""
     up = "../" * app.env.docname.count("/")
     for node in list(doctree.findall(download_reference)):
-        path, _, anchor = node["reftarget"].partition("#")
-        if Path(path).name in APPS:
-            uri = up + Path(path).name + (f"#{anchor}" if anchor else "")
-            node.replace_self(nodes.reference("", "", *node.children, refuri=uri))
+        name = Path(node["reftarget"]).name
+        if re.split("[#?]", name)[0] in APPS:
+            node.replace_self(nodes.reference("", "", *node.children, refuri=up + name))
 
 
 def mend_page(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
@@ -157,6 +161,7 @@ def copy_notebooks(app: Any, error: Exception | None) -> None:
 
 def setup(app: Any) -> None:
     app.connect("autodoc-process-docstring", split_attributes, priority=400)  # before Napoleon
+    app.connect("source-read", keep_anchors)
     app.connect("doctree-read", link_apps, priority=100)
     app.connect("html-page-context", mend_page, priority=900)  # after the theme
     app.connect("builder-inited", draw_card)

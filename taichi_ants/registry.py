@@ -75,8 +75,9 @@ class Registry(Generic[T]):
 
     def unknown(self, name: object, otherwise: str = "") -> AntsError:
         """Return the error for a name that is not registered; `otherwise` is a further way out."""
-        similar = difflib.get_close_matches(str(name)[:80], self.names(), 1)
-        meant = f" (did you mean {similar[0]}?)" if similar else ""
+        names = {known.lower(): known for known in self.names()}
+        similar = difflib.get_close_matches(str(name)[:80].lower(), names, 1)
+        meant = f" (did you mean {names[similar[0]]}?)" if similar else ""
         known = f"choose one of {', '.join(self.names())}, {otherwise}or " if self.names() else ""
         return AntsError(
             f"there is no {self.kind} {shown(name)}{meant}; {known}register it with "

@@ -95,7 +95,7 @@ def tabulate(
     """
     seen = ShownObservations(observations.get(observation), observation_format).table
     n_states, given = len(seen), np.asarray(function(seen))
-    what = "the array that the function returned"
+    what = "the result of your function"
     if given.ndim == 1:
         actions = as_array(what, given, "iu", (n_states,), 0, N_ACTIONS - 1)
         return np.eye(N_ACTIONS, dtype=np.float32)[actions]

@@ -82,6 +82,7 @@ def settings_of(name: str) -> tuple[DeclaredSetting, ...]:
 def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
     """Raise AntsError unless the world depends on a seed."""
     if not is_drawn(name_or_path):
+        build(name_or_path)  # the name may be wrong
         drawn = ", ".join(filter(is_drawn, names()))
         raise AntsError(
             f"{option} has no effect on {shown(name_or_path)}, which is not drawn at random; leave "
