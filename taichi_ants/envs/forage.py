@@ -247,17 +247,6 @@ class Rollout:
     """The results of several steps of n environments; row t of each array is step t.
 
     On a GPU, an array stays there until you read it. Iteration yields all arrays, in this order.
-
-    Attributes:
-        observations: The observations before each step, and after the last one: (steps + 1, n, ...)
-            of the dtype of the observation space. `observations[1:]` are those that `step` returns.
-        actions: The actions taken, int64 (steps, n).
-        rewards: float64 (steps, n).
-        terminated, truncated: bool (steps, n).
-        events: The results of the actions, codes of `Event` as uint8 (steps, n). `NONE` in steps
-            that only begin an episode, or of environments that wait for a reset.
-        final_observations: The last observation of each episode that ended, (episodes, ...), in
-            the order of `np.argwhere(terminated | truncated)`.
     """
 
     _NAMES = "observations", "actions", "rewards", "terminated", "truncated", "events"
@@ -283,31 +272,47 @@ class Rollout:
 
     @cached_property
     def observations(self) -> np.ndarray:
+        """The observations before each step and after the last one, (steps + 1, n, ...).
+
+        Their dtype is that of the observation space. `observations[1:]` are those of `step`.
+        """
         self._rows("seen")
         return self._seen
 
     @cached_property
     def actions(self) -> np.ndarray:
+        """The actions taken, int64 (steps, n)."""
         return self._rows("taken")
 
     @cached_property
     def rewards(self) -> np.ndarray:
+        """The rewards, float64 (steps, n)."""
         return self._rows("rewards_of")
 
     @cached_property
     def terminated(self) -> np.ndarray:
+        """Whether a step terminated the episode, bool (steps, n)."""
         return self._rows("result_rows") & TERMINATED != 0
 
     @cached_property
     def truncated(self) -> np.ndarray:
+        """Whether a step truncated the episode, bool (steps, n)."""
         return self._rows("result_rows") & TRUNCATED != 0
 
     @cached_property
     def events(self) -> np.ndarray:
+        """The results of the actions, codes of `Event` as uint8 (steps, n).
+
+        `NONE` in steps that only begin an episode, or of environments that wait for a reset.
+        """
         return self._rows("result_rows") & (TRUNCATED - 1)
 
     @cached_property
     def final_observations(self) -> np.ndarray:
+        """The last observation of each episode that ended, (episodes, ...).
+
+        They are in the order of `np.argwhere(terminated | truncated)`.
+        """
         over = self.terminated | self.truncated
         if self._shows is None:
             return self.observations[1:][over]
