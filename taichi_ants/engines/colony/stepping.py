@@ -24,9 +24,9 @@ _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _SORT_SECONDS = 0.25  # about the time in which Taichi loads the kernel that sorts
 _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # checks of a thread at a barrier, which take at least half a second
-# Trials of another number of threads: seconds in a launch, the share of all time, and the log of
-# the gain in speed for which the number changes.
-_TRIAL_SECONDS, _TRIAL_SHARE, _LEAST_GAIN = 0.002, 0.03, 0.02
+# Trials of another number of threads: seconds in a launch, so that waking threads takes little of
+# them; the share of all time; and the log of the gain in speed for which the number changes.
+_TRIAL_SECONDS, _TRIAL_SHARE, _LEAST_GAIN = 0.01, 0.03, 0.02
 
 
 class ThreadChoice:
