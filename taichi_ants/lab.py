@@ -183,16 +183,16 @@ def _begun(scene: dict[str, Any], capacity: int) -> Colony:
     task = queueing() if scene["rules"] & QUEUES else task
     life = {"regrowth": None if scene["regrowth"] < 0 else scene["regrowth"]}
     task = task.replace(evaporation_in_training=True, life=life, **_numbers(scene))
-    learner, sharing, policy = scene["learner"], "shared", None
+    learner, policy = scene["learner"], None
     if learner == "frozen":
-        learner, sharing, policy = "q_learning", "frozen", trail_follower(task.observation)
+        learner, policy = "q_learning", trail_follower(task.observation)
     numbers = max(scene["rate"], 0.001), scene["discount"], scene["epsilon"], 1.0, 0.0
     colony = Colony(
         lab_world(scene["world"], scene["seed"]),
         task,
         TrainingConfig(learner, *numbers, initial_q=scene["first"]),
         *(scene["seed"], scene["ants"], capacity),
-        sharing=sharing,
+        sharing="shared" if policy is None else "frozen",
         q_values=policy,
     )
     colony.begin_episode()
