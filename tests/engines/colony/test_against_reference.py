@@ -138,7 +138,7 @@ def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers)
     """Deliveries by nest and kind, loads, regrowth, births by nest: two episodes each."""
     learner, sharing, observation, *rules, nests, kinds, loads = kernel
     seen, simple = np.zeros(5, dtype=int), observation.replace("other_nest_ants", "paper")
-    for seed in range(12):
+    for seed in range(16):
         drawn = of_kernel(seed, learner, sharing, simple, *rules)
         drawn = with_nests(drawn, seed, nests, kinds, loads)
         if observation == "other_nest_ants":
