@@ -351,7 +351,8 @@ def public_members(kind: Any) -> dict[str, Any]:
             continue
         hidden |= {*INTERNAL.get(base.__name__, "").split()} - found.keys()
         for name, value in vars(base).items():
-            is_member = callable(value) or isinstance(value, _MEMBERS)
+            # The docstring of the class describes properties that have none of their own.
+            is_member = callable(value) or (isinstance(value, _MEMBERS) and value.__doc__)
             if is_member and name[0] != "_" and name not in hidden:
                 found.setdefault(name, value)
     return found

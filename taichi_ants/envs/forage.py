@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple, get_args
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import Any, Literal, get_args
 
 import gymnasium
 import numpy as np
@@ -239,8 +240,10 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         return None if self.render_mode is None else self._ants.draw(0)
 
 
-class Rollout(NamedTuple):
+class Rollout:
     """The results of several steps of n environments; row t of each array is step t.
+
+    On a GPU, an array stays there until you read it. Iteration yields all arrays, in this order.
 
     Attributes:
         observations: The observations before each step, and after the last one: (steps + 1, n, ...)
@@ -254,13 +257,58 @@ class Rollout(NamedTuple):
             the order of `np.argwhere(terminated | truncated)`.
     """
 
-    observations: np.ndarray
-    actions: np.ndarray
-    rewards: np.ndarray
-    terminated: np.ndarray
-    truncated: np.ndarray
-    events: np.ndarray
-    final_observations: np.ndarray
+    _NAMES = "observations", "actions", "rewards", "terminated", "truncated", "events"
+
+    def __init__(
+        self,
+        seen: np.ndarray,
+        rows: Callable[[str], np.ndarray],
+        shows: Callable[[np.ndarray], np.ndarray] | None,
+    ) -> None:
+        """Take the observations, a function that fills rows, and one that shows final states.
+
+        The latter is None if the observation after each step is the last one of its episode.
+        """
+        self._seen, self._rows, self._shows = seen, rows, shows
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        return (getattr(self, name) for name in (*self._NAMES, "final_observations"))
+
+    def __getstate__(self) -> dict[str, np.ndarray]:
+        """Return all arrays, for copies and pickles."""
+        return dict(zip((*self._NAMES, "final_observations"), self, strict=True))
+
+    @cached_property
+    def observations(self) -> np.ndarray:
+        self._rows("seen")
+        return self._seen
+
+    @cached_property
+    def actions(self) -> np.ndarray:
+        return self._rows("taken")
+
+    @cached_property
+    def rewards(self) -> np.ndarray:
+        return self._rows("rewards_of")
+
+    @cached_property
+    def terminated(self) -> np.ndarray:
+        return self._rows("result_rows") & TERMINATED != 0
+
+    @cached_property
+    def truncated(self) -> np.ndarray:
+        return self._rows("result_rows") & TRUNCATED != 0
+
+    @cached_property
+    def events(self) -> np.ndarray:
+        return self._rows("result_rows") & (TRUNCATED - 1)
+
+    @cached_property
+    def final_observations(self) -> np.ndarray:
+        over = self.terminated | self.truncated
+        if self._shows is None:
+            return self.observations[1:][over]
+        return self._shows(self._rows("final_states")[over])
 
 
 class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct bases
@@ -334,36 +382,24 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         length, actions, q_values = _checked_plan(policy, steps, n, ants.task)
         epsilon, choices = checked_share("epsilon", epsilon), None
         shape, table = (length, n), ants.shown.table
-        into = Rollout(
-            np.empty((length + 1, n, *table.shape[1:]), table.dtype),
-            np.empty(shape, np.int64) if actions is None else actions,
-            *(np.empty(shape), np.empty(shape, bool), np.empty(shape, bool)),
-            events=np.empty(shape, np.uint8),
-            final_observations=table[:0],
-        )
         if q_values is not None:
             drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
             best = q_values >= q_values.max(axis=1, keepdims=True)
             streams = stream_state(drawn, STREAM_ROLLOUT, np.arange(n))
             choices = best @ (1 << np.arange(N_ACTIONS)), streams, epsilon
-        # Rows that kernels do not write are short, because a GPU copies them nevertheless.
-        finals = np.empty((length, n if ants.mode is AutoresetMode.SAME_STEP else 1), np.int32)
-        into.observations[0] = ants.shown.show(ants.batched.arrays["states"])
+        same_step = ants.mode is AutoresetMode.SAME_STEP
+        seen = np.empty((length + 1, n, *table.shape[1:]), table.dtype)
+        seen[0] = ants.shown.show(ants.batched.arrays["states"])
         rows = {
-            "taken": into.actions,
-            "seen": into.observations[1:],
-            "rewards_of": into.rewards,
-            "result_rows": into.events,
-            "final_states": finals,
+            "taken": np.empty(shape, np.int64) if actions is None else actions,
+            "seen": seen[1:],
+            "rewards_of": np.empty(shape),
+            "result_rows": np.empty(shape, np.uint8),
+            # Kernels write no other rows.
+            "final_states": np.empty((length, n if same_step else 1), np.int32),
         }
-        ants.batched.rollout(rows, table, waiting, _AFTER_END[ants.mode], choices)
-        np.not_equal(into.events & TERMINATED, 0, out=into.terminated)
-        np.not_equal(into.events & TRUNCATED, 0, out=into.truncated)
-        np.bitwise_and(into.events, TRUNCATED - 1, out=into.events)
-        over = into.terminated | into.truncated
-        if ants.mode is AutoresetMode.SAME_STEP:
-            return into._replace(final_observations=ants.shown.show(finals[over]))
-        return into._replace(final_observations=into.observations[1:][over])
+        fetch = ants.batched.rollout(rows, table, waiting, _AFTER_END[ants.mode], choices)
+        return Rollout(seen, fetch, ants.shown.show if same_step else None)
 
 
 def _checked_plan(

@@ -18,6 +18,7 @@ from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
+    ANTS_OF_PLACE,
     BARRIER_SIZE,
     BY_ANT,
     COLUMNS,
@@ -192,7 +193,8 @@ class ColonyState:
         self._shared_rows = model.n_rows if sharing == "shared" else 0
         self.chunks = 1
         if self.schedule != "by_world":
-            places = PLACES if self.schedule == BY_ANT else running.threads
+            places = min(PLACES, -(-self.capacity // ANTS_OF_PLACE))
+            places = places if self.schedule == BY_ANT else running.threads
             sizes = len(self.seeds), self.capacity, self._shared_rows * ROW, places
             self.chunks = most_chunks(*sizes)
         self.arrays = _no_arrays(self.schedule)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -17,7 +17,9 @@ from taichi_ants.records import Snapshot
 from taichi_ants.task import Task
 from taichi_ants.worlds.world import World
 
-_STEPS_OF_LAUNCH = 1 << 23  # of all ants in a rollout; a launch cannot be interrupted
+# Steps of all ants in a launch of a rollout, which cannot be interrupted; and on a GPU, numbers of
+# their observations, because indices have 32 bits.
+_STEPS_OF_LAUNCH, _NUMBERS_ON_GPU = 1 << 23, 1 << 28
 # The arrays with one int32 per ant; the first ones are what environments show of a step.
 SHOWN = "states", "paper_states", "results", "reasons", "deliveries"
 _OF_ANTS = (
@@ -126,8 +128,10 @@ class BatchedEnvironments:
         begins: np.ndarray,
         after_end: Command,
         policy: tuple[np.ndarray, np.ndarray, float] | None,
-    ) -> None:
-        """Take several steps, and record each.
+    ) -> Callable[[str], np.ndarray]:
+        """Take several steps, and record each; return a function that returns rows by name.
+
+        On a GPU, results stay there until this function is called with their name.
 
         Args:
             rows: Arrays (steps, n, ...) by name. `taken`, int64, are the actions: given ones or,
@@ -142,12 +146,18 @@ class BatchedEnvironments:
                 each ant, uint64 (n,), and epsilon; or None.
         """
         launch = self._launch(policy is not None, shown[0].size)
+        from taichi_ants.engines.device_memory import copy_out
+        from taichi_ants.engines.launch import check_not_lost
+
         if self._codes is None:
             from taichi_ants.engines.runs.rollout_kernel import CODES_OF_CHUNK, WIDTH
 
             chunks = 1 if runtime.compiles_for_gpu() else -(-self.n // WIDTH)
             self._codes = np.empty(chunks * CODES_OF_CHUNK, np.int64)
-        steps = max(1, _STEPS_OF_LAUNCH // self.n)
+        most = _STEPS_OF_LAUNCH
+        if runtime.compiles_for_gpu():
+            most = _NUMBERS_ON_GPU // shown[0].size
+        steps = max(1, most // self.n)
         values = {
             **self._arguments,
             # As arrays of their own, which many steps read faster.
@@ -161,23 +171,47 @@ class BatchedEnvironments:
             values |= {"best": best, "choices": choices, "explore_below": below}
         self.arrays["commands"][:] = begins
         self.arrays["after_end"][0] = after_end
+        on_gpu: list[tuple[dict[str, np.ndarray], dict[str, Any]]] = []
         with runtime.alone:
             for first in range(0, len(rows["taken"]), steps):
                 part = {name: one[first : first + steps].reshape(-1) for name, one in rows.items()}
-                launch({**values, **part, "n_steps": len(part["taken"]) // self.n})
-        self.arrays["rewards_of"][:] = rows["rewards_of"][-1]
+                several = {**values, **part, "n_steps": len(part["taken"]) // self.n}
+                on_gpu.append((part, launch.without_outputs(several)))
+
+        def fetch(name: str) -> np.ndarray:
+            for part, outputs in on_gpu:
+                if (copy := outputs.pop(name, None)) is not None:
+                    check_not_lost([copy])
+                    copy_out(copy, part[name])
+            return rows[name]
+
+        last = self.arrays["rewards_of"]
+        if (rewards := on_gpu[-1][1].get("rewards_of")) is not None:
+            copy_out(rewards, last, len(on_gpu[-1][0]["rewards_of"]) - self.n)
+        else:
+            last[:] = rows["rewards_of"][-1]
+        return fetch
 
     def _launch(self, follows: bool, width: int) -> Any:
         """Return the `Launch` of a rollout with observations of `width` numbers."""
         if (follows, width) not in self._launches:
             runtime.start()  # configures Taichi before the imports below
-            from taichi_ants.engines.launch import Launch, on_device
+            from taichi_ants.engines.device_memory import on_device
+            from taichi_ants.engines.launch import Launch
             from taichi_ants.engines.runs.rollout_kernel import WIDTH, rollout_kernel
             from taichi_ants.engines.runs.step import Rules
 
             names = () if width else self._names
             form = Rules.of(self.task), follows, width, self.n <= WIDTH, names
-            self._launches[follows, width] = Launch(partial(rollout_kernel, *form))
+            changed = {"memory", "random_states", "choices"}
+            outputs = {"seen", "rewards_of", "result_rows", "final_states", "codes"}
+            if width == 0:
+                changed, outputs = changed | {"rewards_of"}, set[str]()
+            elif follows:
+                outputs.add("taken")
+            self._launches[follows, width] = Launch(
+                partial(rollout_kernel, *form), changed, outputs
+            )
             if runtime.compiles_for_gpu() and self._cells_on_gpu is None:
                 self._cells_on_gpu = cells = on_device(self.arrays["cells"])
                 self._arguments["cells"] = self._of_steps["cells"] = cells
@@ -198,10 +232,11 @@ class BatchedEnvironments:
     def _fetch_cells(self) -> None:
         """Copy the cells from the GPU, if they are there."""
         if self._cells_on_gpu is not None:
+            from taichi_ants.engines.device_memory import copy_out
             from taichi_ants.engines.launch import check_not_lost
 
             check_not_lost([self._cells_on_gpu])
-            self.arrays["cells"][:] = self._cells_on_gpu.to_numpy()
+            copy_out(self._cells_on_gpu, self.arrays["cells"])
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without Taichi's objects, so that copies and pickles work."""
