@@ -63,7 +63,8 @@ class Setting:
     Attributes:
         help: A phrase that describes the setting.
         unit: The unit of a number, for example "ticks".
-        least, most, above: Bounds: the smallest and the largest value, and an excluded lower bound.
+        least, most: The smallest and the largest value.
+        above: A lower bound that is not allowed itself.
         only: The name of another setting of the class, and the values of it that this setting
             requires; with other values it must have its default.
         usual: The value that replaces None where the setting has an effect.
