@@ -280,13 +280,18 @@ class _Documentation:
     def __get__(self, _: object, cls: type) -> str:
         if not _is_ready(cls) or not declared(cls):
             return self._text
-        lines = [cleandoc(self._text), "", "Attributes:"]
-        for setting in declared(cls):
-            values, default, meaning = setting.in_words
-            absent = default if default == "required" else f"default: {default}"
-            line = f"{setting.name}: {meaning}; {values} ({absent})."
-            lines.append(fill(line, 100, initial_indent=" " * 4, subsequent_indent=" " * 8))
-        return "\n".join(lines)
+        return _described(self._text, "Attributes", declared(cls))
+
+
+def _described(text: str, heading: str, settings: Iterable[DeclaredSetting]) -> str:
+    """Return a docstring, followed by settings as they are declared."""
+    lines = [cleandoc(text), "", f"{heading}:"]
+    for setting in settings:
+        values, default, meaning = setting.in_words
+        absent = default if default == "required" else f"default: {default}"
+        line = f"{setting.name}: {meaning}; {values} ({absent})."
+        lines.append(fill(line, 100, initial_indent=" " * 4, subsequent_indent=" " * 8))
+    return "\n".join(lines)
 
 
 class Settings:
@@ -397,6 +402,9 @@ class Settings:
         """Return the settings with changes; settings that lose their effect get their defaults.
 
         To change a group, give a mapping of its settings; its entry "" is the value to start from.
+
+        >>> Pheromone("exponential", half_life=30).replace(diffusion=0.1).half_life
+        30.0
         """
         for setting in declared(type(self)):
             name = setting.name
@@ -414,7 +422,11 @@ class Settings:
 
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
-        """Return the settings in a mapping, checked; groups are mappings or names."""
+        """Return the settings in a mapping, checked; groups are mappings or names.
+
+        >>> Task.from_dict({"observation": "ants", "pheromone": {"level": 300}}).pheromone.level
+        300
+        """
         return cls(**cls._required(facts)).replace(**facts)
 
     @classmethod
@@ -532,6 +544,8 @@ def checked(function: Function, path: str = "world") -> Function:
         }
         return function(**arguments)
 
+    if "Args:" not in (text := function.__doc__ or ""):
+        calls.__doc__ = _described(text, "Args", declared(function))
     return calls  # type: ignore[return-value]
 
 

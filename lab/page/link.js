@@ -22,7 +22,7 @@ import { WORLDS } from "./worlds.js";
 /** @typedef {import("./engine.js").Change} Change */
 
 const LINK_VERSION = 1, SETTING = 4, WAIT = 6, END = 7, LONGEST_WAIT = 96;
-const STROKE_KINDS = ["rock", "food", "scent", "erase"];
+const STROKE_KINDS = ["rock", "food", "scent", "erase", "", "trail"]; // 4 is SETTING
 const SETTING_KINDS = ["ants", "epsilon", "rate", "discount", "level", "shaping", "learns"];
 const SCENE_NUMBERS = ["seed", "ants", "epsilon", "rate", "discount", "learns", "first", "level", "regrowth", "shaping"];
 

@@ -224,6 +224,7 @@ class Lab {
 
   frame(now) {
     requestAnimationFrame((next) => this.frame(next));
+    if (this.training.dialog.open) return; // the processor is for the ants that train
     const { ui } = this, passed = Math.min(0.3, (now - this.last) / 1000 || 0);
     [this.last, ui.now] = [now, now];
     if (!this.fits) this.fit();

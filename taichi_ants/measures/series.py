@@ -24,6 +24,10 @@ class Series(Record):
         values: The values of each measure by name, float64 (R,). Measures with parts have a name
             for each, as "entropy.trail". A value is nan if the measure has none.
         units: The unit of each measure by name; "" if it has none.
+
+    >>> series = colony.run(1, 200, measures=["deliveries"], every=100).series
+    >>> series.ticks.tolist(), series.values["deliveries"].shape
+    ([100, 200], (2,))
     """
 
     worlds: np.ndarray

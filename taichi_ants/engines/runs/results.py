@@ -34,8 +34,10 @@ class TrainingResult(Record, Tidy):
     Two results are equal if everything except `seconds` is equal.
 
     Attributes:
-        returns, steps, deliveries: int32 (C, S, E), for each episode the undiscounted sum of
-            rewards, the number of steps, and 1 if the ant delivered, else 0.
+        world, configs, seeds, max_steps, task: The arguments of `train`; `configs` is a tuple.
+        returns: int32 (C, S, E), the undiscounted sum of the rewards of each episode.
+        steps: int32 (C, S, E), its number of steps.
+        deliveries: int32 (C, S, E), 1 if the ant delivered in it, else 0.
         seconds: The time of the last training without compilation: CPU seconds of all threads, or
             wall-clock seconds on a GPU.
         state: The state of the runs after the last episode, with leading axes (C, S).
@@ -104,7 +106,12 @@ class TrainingResult(Record, Tidy):
 
     @classmethod
     def load(cls, path: PathLike) -> TrainingResult:
-        """Return a result that `save` wrote; its learners need not be registered."""
+        """Return a result that `save` wrote; its learners need not be registered.
+
+        >>> result.save("result.npz")
+        >>> TrainingResult.load("result.npz") == result
+        True
+        """
         with _KIND.reading(path) as (arrays, facts):
             task = Task.from_dict(facts["task"])
             outcomes: dict[str, Any] = {name: arrays[name] for name in OUTCOMES}
@@ -123,9 +130,12 @@ class TrainingResult(Record, Tidy):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rollouts(Record, Tidy):
-    """The result of `evaluate`: int32 arrays of shape q_values.shape[:-2] + (rollouts,).
+    """The result of `evaluate`.
 
-    `seeds` has the seed of each table, in the order of the last of its leading axes.
+    Attributes:
+        returns, steps, deliveries: As in `TrainingResult`, but int32 (..., rollouts), where ... are
+            the leading axes of the tables.
+        seeds: The seed of each table, in the order of the last of the leading axes.
 
     >>> evaluate(worlds.paper(), result.q_values, seeds=range(3), rollouts=5).steps.shape
     (1, 3, 5)
