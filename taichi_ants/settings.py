@@ -215,6 +215,7 @@ class DeclaredSetting(NamedTuple):
             return self._named(value, {}) if isinstance(value, Mapping) else None
         if issubclass(self.kind, Settings):
             value = self.kind.converted(value)
+            value = self.kind.from_dict(value) if isinstance(value, Mapping) else value
         return value if isinstance(value, self.kind) else None
 
     def _named(self, value: Mapping[Any, Any], start: Mapping[str, Any]) -> Named[Any]:
