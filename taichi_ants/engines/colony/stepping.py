@@ -144,6 +144,10 @@ class TickingColony(ColonyState):
 
         Raises:
             AntsError: The number of worlds or seeds is wrong, or a seed is not allowed.
+
+        >>> colony.reset_worlds(np.array([True]))
+        >>> colony.episode, colony.ticks
+        (1, 0)
         """
         which = as_array("which", which, "b", (len(self.seeds),))
         if seeds is None:
