@@ -34,17 +34,18 @@ class Launch:
     `kernel_of` returns the kernel for a pack type. Packs contain NumPy arrays, which kernels change
     in place; arrays of `ti.ndarray`; whole numbers, as i32, or u64 for `np.uint64`; and floats, as
     f32. For a GPU, kernels are compiled with the guards of `arithmetic.guards`, and each launch
-    copies NumPy arrays to the GPU, except those of `outputs`, and the `changed` ones and `outputs`
-    back.
+    copies NumPy arrays to the GPU, except those of `outputs`, and `outputs` and the `changed` ones
+    back, by default all.
     """
 
     def __init__(
         self,
         kernel_of: Callable[[Any], Any],
-        changed: Collection[str] = (),
+        changed: Collection[str] | None = None,
         outputs: Collection[str] = (),
     ) -> None:
-        self._kernel_of, self._changed, self._outputs = kernel_of, changed, outputs
+        self._kernel_of, self._outputs = kernel_of, outputs
+        self._back = None if changed is None else {*changed, *outputs}
         self._copies: dict[str, Any] = {}  # of NumPy arrays, on a GPU
         self._taichi: Any = lambda: None  # the Taichi runtime for which the launch was prepared
         self._repeats: Any = self._taichi  # the same, if the launch needs nothing else
@@ -93,7 +94,8 @@ class Launch:
         with self._flushing:
             impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
         for name, copy in self._copies.items():
-            if name in self._changed or (name in self._outputs and not self._leaves):
+            leaves = self._leaves and name in self._outputs
+            if not leaves and (self._back is None or name in self._back):
                 copy_out(copy, self._known[name])
 
     def _on_device(self, name: str) -> Any:
