@@ -1,6 +1,6 @@
 /* article.js: ten worlds in a text, and Python that replays the one that ran last. */
 
-import { linkOf } from "../page/link.js";
+import { pythonOf } from "../page/link.js";
 import { openPage, Stage } from "./world.js";
 
 class Article extends Stage {
@@ -11,10 +11,7 @@ class Article extends Stage {
 
   /** Three lines of Python that replay the world that ran last, up to the tick at which the reader gets here. */
   python() {
-    const world = this.last;
-    if (!world || !world.run) return;
-    const { engine } = world.run;
-    document.getElementById("python").textContent = `from taichi_ants import replay\nvisit = replay("${linkOf(engine)}")\nprint(visit.hash)  # ${engine.hash()}`;
+    if (this.last?.run) document.getElementById("python").textContent = pythonOf(this.last.run.engine);
   }
 }
 

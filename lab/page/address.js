@@ -1,7 +1,7 @@
 /* address.js: the address holds the scene, the seed and every stroke, so that a link replays a visit to the bit. */
 
 import { byId } from "./controls.js";
-import { decode, encode, linkOf, partsOf } from "./link.js";
+import { decode, encode, linkOf, partsOf, pythonOf } from "./link.js";
 import { QUESTIONS } from "./scenes.js";
 import { many } from "./story.js";
 
@@ -68,8 +68,7 @@ export class Address {
 
   /** Three lines of Python that replay the right run, and print the state that the page shows. */
   async verify() {
-    const run = this.lab.runs[this.lab.runs.length - 1], text = linkOf(run.engine);
-    const lines = `from taichi_ants import replay\nvisit = replay("${text}")\nprint(visit.hash)  # ${run.engine.hash()}`;
+    const run = this.lab.runs[this.lab.runs.length - 1], lines = pythonOf(run.engine);
     const done = await copied(lines);
     this.lab.toast(done ? `Three lines of Python copied. They print ${run.engine.hash()}, the state at tick ${many(run.tick)}.`
       : "This browser does not let the page copy. The link in the address verifies as well.", 6000);

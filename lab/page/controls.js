@@ -21,22 +21,28 @@ export const icon = (name) => `<svg viewBox="0 0 18 18" fill="currentColor" aria
 
 const SPEEDS = [0.5, 1, 4, 16];
 const BRUSHES = [["rock", "Rock", "Draw rock (R)"], ["food", "Food", "Draw food (F)"], ["scent", "Trail", "Draw a trail (T)"],
-                 ["erase", "Erase", "Erase rock, food and trails (E)"], ["look", "", "Look into an ant (L)"]];
+                 ["erase", "Erase", "Erase rock, food and trails (E)"], ["look", "Look", "Look into an ant (L)"]];
 const COUNTS = [1, 2, 4, 8, 12, 16, 24, 32, 40, 48, 64, 80, 100, 128, 160, 200, 250, 300, 350, 400, 450, 500, 600, 700, 800, 1000,
                 1500, 2000, 3000, 5000, 10000];
 const percent = (v) => `${Math.round(v * 100)} %`;
 
-/** Sliders: the values of their steps, the words, and whether a change starts the run again. @type {any[]} */
+/** Sliders: the values of their steps, the words, what they mean, and whether a change starts the run again. @type {any[]} */
 const SLIDERS = [
   { name: "ants", label: "Ants", steps: COUNTS, words: many },
-  { name: "epsilon", label: "Exploration", steps: Array.from({ length: 51 }, (_, k) => k / 100), words: percent },
-  { name: "level", label: "Scent lasts", steps: Array.from({ length: 24 }, (_, k) => 50 * k + 50), words: seconds },
-  { name: "shaping", label: "Reward for walking a trail", steps: Array.from({ length: 11 }, (_, k) => k), words: (v) => `${v}` },
-  { name: "discount", label: "Discount", steps: Array.from({ length: 100 }, (_, k) => k / 100), words: (v) => v.toFixed(2) },
+  { name: "epsilon", label: "Exploration", steps: Array.from({ length: 51 }, (_, k) => k / 100), words: percent,
+    help: "Exploration: how many of their actions are random" },
+  { name: "level", label: "Scent lasts", steps: Array.from({ length: 24 }, (_, k) => 50 * k + 50), words: seconds,
+    help: "Scent lasts: how long it takes new scent to fade" },
+  { name: "shaping", label: "Reward for walking a trail", steps: Array.from({ length: 11 }, (_, k) => k), words: (v) => (v === 1 ? "1 point" : `${v} points`),
+    help: "Reward for each step along scent, or with food nearer to the nest; food at home pays 10 points" },
+  { name: "discount", label: "Discount", steps: Array.from({ length: 100 }, (_, k) => k / 100), words: (v) => v.toFixed(2),
+    help: "Discount: what a point is worth one step later. At 0, only the next reward counts." },
   { name: "rate", label: "Learning rate", steps: Array.from({ length: 50 }, (_, k) => (k + 1) / 100), words: (v) => v.toFixed(2), more: true },
   { name: "first", label: "First values", steps: Array.from({ length: 21 }, (_, k) => k), words: String, more: true, restarts: true },
   { name: "regrowth", label: "Food grows back after", steps: [0, 20, 50, 100, 200, 500, 1000], words: (v) => (v ? seconds(v) : "at once"), more: true, restarts: true },
 ];
+const LEARNING_HELP = "Learning: while it is off they go on with what they know and learn nothing more";
+const RULES_HELP = "Rules: what ants see and who gives way and where scent points. A change starts again.";
 const RULE_NAMES = [["paper", "the paper’s"], ["foraging", "foraging"], ["queueing", "foraging and queues"]];
 const PART_NAMES = [["directed", "A: scent rises towards food"], ["rightOfWay", "B: ants with food have right of way"],
                     ["seesAnts", "C: ants see each other"]];
@@ -48,11 +54,11 @@ const SIZES = ["small", "medium", "large", "huge"];
 /** The index of the step that is nearest to a value. */
 const stepOf = (steps, value) => steps.reduce((best, step, k) => (Math.abs(step - value) < Math.abs(steps[best] - value) ? k : best), 0);
 
-const switched = (id, label) => `<div class="control"><div class="name"><span id="l-${id}">${label}</span>`
+const switched = (id, label, help) => `<div class="control" title="${help}"><div class="name"><span id="l-${id}">${label}</span>`
   + `<button class="switch" id="${id}" role="switch" aria-labelledby="l-${id}" aria-checked="false"></button></div></div>`;
-const selected = (id, label, options) => `<div class="control"><label><span>${label}</span><select id="${id}">`
+const selected = (id, label, options, help = "") => `<div class="control" title="${help}"><label><span>${label}</span><select id="${id}">`
   + `${options.map(([value, words]) => `<option value="${value}">${words}</option>`).join("")}</select></label>`;
-const slider = ({ name, label, steps }) => `<div class="control"><label for="c-${name}"><span>${label}</span><output id="o-${name}"></output></label>`
+const slider = ({ name, label, steps, help = "" }) => `<div class="control" title="${help}"><label for="c-${name}"><span>${label}</span><output id="o-${name}"></output></label>`
   + `<input type="range" id="c-${name}" min="0" max="${steps.length - 1}" step="1"></div>`;
 
 export class Controls {
@@ -61,7 +67,7 @@ export class Controls {
     this.build();
     this.markSpeed = this.radios(byId("speeds"), SPEEDS.map((speed) => [speed, speed === 0.5 ? "½×" : `${speed}×`, `Speed ${speed}`]),
                 () => lab.ui.speed, (speed) => { lab.ui.speed = speed; });
-    this.radios(byId("brushes"), BRUSHES.map(([id, word, label]) => [id, `${icon(id)}${word && `<span class="name">${word}</span>`}`, label]),
+    this.radios(byId("brushes"), BRUSHES.map(([id, word, label]) => [id, `${icon(id)}<span class="name">${word}</span>`, label]),
                 () => lab.ui.brush, (brush) => lab.choose(brush));
     byId("undo").innerHTML = icon("undo");
     byId("undo").addEventListener("click", () => lab.undo());
@@ -71,10 +77,10 @@ export class Controls {
   }
 
   build() {
-    const rules = selected("rules", "Rules", RULE_NAMES) + '<div class="parts" id="parts" hidden>'
+    const rules = selected("rules", "Rules", RULE_NAMES, RULES_HELP) + '<div class="parts" id="parts" hidden>'
       + `${PART_NAMES.map(([part, words]) => `<label><input type="checkbox" data-part="${part}">${words}</label>`).join("")}</div></div>`;
     const [ants, exploration, ...others] = SLIDERS.filter(({ more }) => !more).map(slider);
-    byId("controls").innerHTML = ants + exploration + switched("learns", "Learning") + others.join("") + rules;
+    byId("controls").innerHTML = ants + exploration + switched("learns", "Learning", LEARNING_HELP) + others.join("") + rules;
     byId("more-controls").innerHTML = SLIDERS.filter(({ more }) => more).map(slider).join("")
       + `${selected("learner", "Learner", LEARNER_NAMES.map(([learner, words]) => [LEARNERS[learner], words]))}</div>`
       + `${selected("reach", "Brush size", SIZES.map((size, k) => [k, size]))}</div>`
@@ -82,6 +88,10 @@ export class Controls {
       + '<div class="control"><label><span>Seed</span><input type="number" id="seed" min="0" max="4294967295" step="1"></label></div>'
       + `${selected("theme", "Colours", [["dark", "dark"], ["light", "light"]])}</div>`;
     for (const each of SLIDERS) this.listen(each);
+    byId("controls").addEventListener("focusin", ({ target }) => { // for fingers and keys, which cannot hover
+      const { title } = target.closest(".control");
+      if (title) this.lab.toast(title, 5000);
+    });
     const on = (id, act) => byId(id).addEventListener("change", ({ target }) => act(target));
     byId("learns").addEventListener("click", () => this.lab.set("learns", this.scene.learns ? 0 : 1));
     on("rules", ({ value }) => this.lab.restart({ rules: RULES[value] }));
@@ -111,7 +121,6 @@ export class Controls {
     const input = byId(`c-${name}`);
     byId(`o-${name}`).textContent = words;
     input.setAttribute("aria-valuetext", words);
-    input.style.setProperty("--at", `${100 * Number(input.value) / Number(input.max)}%`);
   }
 
   /** Show the present settings. */
@@ -122,14 +131,14 @@ export class Controls {
       this.say(name, words(scene[name]));
     }
     byId("learns").setAttribute("aria-checked", String(Boolean(scene.learns)));
-    const fill = (id, value) => { byId(id).value = String(value); };
     const foraging = scene.rules && !(scene.rules & PARTS.queues);
-    fill("rules", scene.rules & PARTS.queues ? "queueing" : foraging ? "foraging" : "paper");
+    const rules = scene.rules & PARTS.queues ? "queueing" : foraging ? "foraging" : "paper", { world, learner, seed } = scene;
     byId("parts").hidden = !foraging;
     for (const box of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("[data-part]"))) {
       box.checked = Boolean(scene.rules & PARTS[box.dataset.part]);
     }
-    for (const [id, value] of [["reach", ui.reach], ["place", scene.world], ["learner", scene.learner], ["seed", scene.seed], ["theme", ui.theme]]) fill(id, value);
+    const shown = { rules, reach: ui.reach, place: world, learner, seed, theme: ui.theme };
+    for (const [id, value] of Object.entries(shown)) byId(id).value = String(value);
   }
 
   /** Buttons of which one is chosen; arrow keys choose the next one. */

@@ -10,6 +10,7 @@ const DIRECTIONS = 32;          // of the pictures of ants
 const MOST_PIXELS = 2;          // per CSS pixel
 const DOTS = { ants: 4000, scale: 1.7 }; // more ants, or smaller cells: ants are dots
 const TAU = 2 * Math.PI;
+const POINTER = [[0, 0], [0, 20], [5, 15], [8, 22], [11, 21], [8, 14], [14, 14]]; // its corners, in CSS pixels
 
 export class Painter {
   /** @type {import("./run.js").Run} */ run;
@@ -190,9 +191,7 @@ export class Painter {
     const px = a + (scatter(cell, 21, 100) / 100 - 0.5) * 0.3 * s, py = b + (scatter(cell, 22, 100) / 100 - 0.5) * 0.3 * s;
     for (const [colour, dx, dy, radius, alpha] of [[1, 0, 0.1, 1, 1], [0, 0, 0, 0.92, 1], [2, -0.16, -0.18, 0.34, 0.8]]) {
       [x.fillStyle, x.globalAlpha] = [look.food[colour], alpha];
-      x.beginPath();
-      x.arc(px + dx * s, py + dy * s, size * radius, 0, TAU);
-      x.fill();
+      circle(x, px + dx * s, py + dy * s, size * radius).fill();
     }
     x.globalAlpha = 1;
   }
@@ -200,9 +199,7 @@ export class Painter {
   drawNest(x) {
     const { look } = this, [nx, ny] = this.place(this.run.engine.queen), size = Math.max(this.s, 3 * this.dpr);
     [x.fillStyle, x.strokeStyle, x.globalAlpha, x.lineWidth] = [look.nest, look.nest, 0.45, 0.16 * size];
-    x.beginPath();
-    x.arc(nx, ny, 1.55 * size, 0, TAU);
-    x.stroke();
+    circle(x, nx, ny, 1.55 * size).stroke();
     x.globalAlpha = 1;
     x.save();
     x.translate(nx, ny);
@@ -241,12 +238,13 @@ export class Painter {
     x.drawImage(this.things, 0, 0);
     if (ui.arrows) this.drawArrows(x, ui);
     this.drawSparks(x, passed, ui);
+    const size = Math.max(10.5 * this.dpr, 1.15 * s), [nx, ny] = this.place(e.queen);
     if (s < DOTS.scale * this.dpr || e.ants > DOTS.ants) this.drawDots(x, part);
     else this.drawAnts(x, part, passed, ui);
-    const size = Math.max(10.5 * this.dpr, 1.15 * s), [nx, ny] = this.place(e.queen);
     const below = Math.max(4.4 * s, 18 * this.dpr), fits = ny + below + size < this.canvas.height;
     this.label(x, "nest", nx, fits ? ny + below : ny - below, size);
     for (const [fx, fy] of this.piles) this.label(x, "food", fx, fy - size, size);
+    this.labelScent(x, nx, ny, size);
     if (ui.ghost) this.drawGhost(x, ui);
     if (ui.pointer) this.drawBrush(x, ui);
     x.globalAlpha = 1;
@@ -260,6 +258,19 @@ export class Painter {
     x.fillText(text, px, py);
     x.fillText(text, px, py); // the halo is twice as strong
     x.shadowBlur = 0;
+  }
+
+  /** Write "scent" on the way to the food, for as long as scent lies there. */
+  labelScent(x, nx, ny, size) {
+    const { levels } = this.run.engine, [pile] = this.piles;
+    let near = 12 * this.s, found = levels[this.scented] ? this.scented : 0;
+    for (let cell = 0; pile && !levels[this.scented] && cell < levels.length; cell++) {
+      if (levels[cell] < 60) continue;
+      const [px, py] = this.place(cell), far = Math.hypot(px - 0.35 * nx - 0.65 * pile[0], py - 0.35 * ny - 0.65 * pile[1]);
+      if (far < near) [near, found] = [far, cell];
+    }
+    this.scented = found;
+    if (found) this.label(x, "scent", ...this.place(found), size);
   }
 
   /** Levels ease towards the present ones; two rounds of averages over neighbours hide the shear of the pixels. */
@@ -335,9 +346,7 @@ export class Painter {
   ring(x, px, py, hero, ui) {
     const beat = hero && !ui.still ? 1.15 + 0.2 * Math.sin(ui.now / 260) : 1;
     [x.strokeStyle, x.lineWidth] = [hero ? this.look.load : this.look.ghost, 1.6 * this.dpr];
-    x.beginPath();
-    x.arc(px, py, this.antLength * 0.95 * beat, 0, TAU);
-    x.stroke();
+    circle(x, px, py, this.antLength * 0.95 * beat).stroke();
   }
 
   drawSparks(x, passed, ui) {
@@ -347,9 +356,7 @@ export class Painter {
     for (const { cell, food, age } of run.sparks) {
       x.globalAlpha = (1 - age) * (food ? 0.7 : 0.4);
       [x.strokeStyle, x.lineWidth] = [food ? look.food[2] : look.nest, (1 - age) * 0.35 * s + 0.5];
-      x.beginPath();
-      x.arc(...this.place(cell), (food ? 0.6 + 1.4 * age : 1.6 + 4.2 * age) * s, 0, TAU);
-      x.stroke();
+      circle(x, ...this.place(cell), (food ? 0.6 + 1.4 * age : 1.6 + 4.2 * age) * s).stroke();
     }
     x.globalAlpha = 1;
   }
@@ -377,30 +384,30 @@ export class Painter {
     x.stroke();
   }
 
-  /** A hand that draws a wall, over and over. */
+  /** A pointer that drags a wall along a dashed line, over and over. */
   drawGhost(x, ui) {
     const { dpr, look } = this, [[ax, ay], [bx, by]] = ui.ghost.map((point) => this.at(point));
-    const cycle = ui.still ? 0.8 : ui.now / 2600 % 1, t = Math.min(1, cycle / 0.6), ease = t * t * (3 - 2 * t);
-    const strength = cycle > 0.8 ? 1 - (cycle - 0.8) / 0.2 : 1, hx = ax + (bx - ax) * ease, hy = ay + (by - ay) * ease;
-    const line = (alpha, width, dash) => {
-      [x.globalAlpha, x.lineWidth] = [alpha * strength, width];
+    const cycle = ui.still ? 0.5 : ui.now / 2600 % 1, t = Math.min(1, cycle / 0.7), ease = t * t * (3 - 2 * t);
+    const hx = ax + (bx - ax) * ease, hy = ay + (by - ay) * ease;
+    [x.lineCap, x.strokeStyle, x.fillStyle] = ["round", look.ghost, look.ghost];
+    const line = (alpha, width, dash, px, py) => {
+      [x.globalAlpha, x.lineWidth] = [alpha, width];
       x.setLineDash(dash);
       x.beginPath();
       x.moveTo(ax, ay);
-      x.lineTo(hx, hy);
+      x.lineTo(px, py);
       x.stroke();
     };
-    [x.lineCap, x.strokeStyle, x.fillStyle] = ["round", look.ghost, look.ghost];
-    line(0.16, 3.4 * this.s, []);
-    line(0.75, 1.6 * dpr, [4 * dpr, 6 * dpr]);
-    x.setLineDash([]);
-    for (const [alpha, radius] of [[0.95, 6], [0.3, 14]]) {
-      x.globalAlpha = alpha * strength;
-      x.beginPath();
-      x.arc(hx, hy, radius * dpr, 0, TAU);
-      x.fill();
-    }
+    line(0.9, 2 * dpr, [5 * dpr, 7 * dpr], bx, by);
+    line(0.4, 3.4 * this.s, [], hx, hy);
     x.globalAlpha = 1;
+    [x.strokeStyle, x.lineWidth] = [look.halo, 2.5 * dpr];
+    x.beginPath();
+    for (const [px, py] of POINTER) x.lineTo(hx + px * dpr, hy + py * dpr);
+    x.closePath();
+    x.stroke();
+    x.fill();
+    this.label(x, "drag", hx + 34 * dpr, hy + 17 * dpr, 15 * dpr);
   }
 
   /** The cells that the brush would change. */
@@ -417,9 +424,7 @@ export class Painter {
     x.stroke(shape);
     x.globalAlpha = 1;
     if (ui.focused) { // by keyboard, the brush must be found
-      x.beginPath();
-      x.arc(...this.at(centre(...ui.pointer)), (ui.reach * ROOT3 + 2.4) * s, 0, TAU);
-      x.stroke();
+      circle(x, ...this.at(centre(...ui.pointer)), (ui.reach * ROOT3 + 2.4) * s).stroke();
     }
   }
 }
@@ -437,6 +442,13 @@ function flowAt(engine, cell, carries) {
     }
   }
   return [dx, dy];
+}
+
+/** The outline of a circle as the path of a context. @returns {CanvasRenderingContext2D} */
+function circle(x, px, py, radius) {
+  x.beginPath();
+  x.arc(px, py, radius, 0, TAU);
+  return x;
 }
 
 function drawLegs(x, look, swing, small) {
@@ -462,9 +474,7 @@ function drawLoad(x, look, small) {
   x.fillStyle = glow;
   x.fillRect(0, -0.45, 0.85, 0.9);
   [x.fillStyle, x.strokeStyle, x.lineWidth] = [look.load, look.edge, 0.07];
-  x.beginPath();
-  x.arc(0.42, 0, small ? 0.2 : 0.165, 0, TAU);
-  x.stroke();
+  circle(x, 0.42, 0, small ? 0.2 : 0.165).stroke();
   x.shadowColor = "transparent";
   x.fill();
 }

@@ -106,7 +106,6 @@ export class Engine {
     const R = this.radius = this.world.radius;
     this.width = 2 * R + 1;
     this.size = this.width * this.width;
-    this.capacity = CAPACITY;
     this.queen = this.world.queen;
     if (!wasm.lay_out(R, R, R, CAPACITY, scene.rules, scene.learner)) throw new Error("There is too little memory.");
     this.look();
@@ -247,7 +246,7 @@ export class Engine {
   /** What the ant sees and will do; see the top of this file. */
   mind(ant) {
     this.wasm.read_mind(ant);
-    const carries = this.looks[ant] & 1, seen = this.seen(carries);
+    const carries = this.looks[ant] & 1, seen = this.seen();
     const next = this.read[9], only = seen.best.length > 1 ? "tie" : "best";
     return { ...seen, carries, next, why: this.read[10] ? "explores" : seen.best.includes(next) ? only : "was best" };
   }
@@ -255,14 +254,13 @@ export class Engine {
   /** What an ant with this place and load would see, and its best actions. */
   policy(cell, heading, carries) {
     this.wasm.see_from(cell, heading, carries);
-    return this.seen(carries);
+    return this.seen();
   }
 
-  seen(carries) {
+  seen() {
     const read = this.read, state = read[0];
     return {
       state, best: bits(read[1]), codes: [...read.slice(2, 5)], levels: [...read.slice(5, 8)], level: read[8],
-      letters: [...read.slice(2, 5)].map((code) => LETTERS[carries][code]),
       values: [...this.values.slice(8 * state, 8 * state + 5)],
     };
   }

@@ -151,6 +151,9 @@ export function decode(code) {
 /** The part of an address after "#" that replays an engine's visit up to now. @param {any} engine */
 export const linkOf = (engine) => `${encode(engine.first, engine.events)};${engine.tick};${engine.hash()}`;
 
+/** Three lines of Python that replay it and print the hash. @param {any} engine */
+export const pythonOf = (engine) => `from taichi_ants import replay\nvisit = replay("${linkOf(engine)}")\nprint(visit.hash)  # ${engine.hash()}`;
+
 /** The parts of such a text: code, and tick and hash if it has them. @param {string} text */
 export function partsOf(text) {
   const [code, tick = "", hash = ""] = decodeURIComponent(text.slice(text.indexOf("#") + 1)).split(";");

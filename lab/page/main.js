@@ -54,9 +54,10 @@ class Lab {
     this.firstFrame = 0;
     this.told = "";   // what the story told last
     this.minds = 0;
-    byId("questions").innerHTML = "<h2>What do you expect?</h2>"
-      + QUESTIONS.map(({ id, title }) => `<button data-question="${id}">${title}</button>`).join("")
-      + '<button data-question="daily">Today’s map: ten rocks</button><button id="train">One ant, alone: learning curves</button>';
+    byId("questions").innerHTML = "<h2>What do you expect?</h2><p>Six questions, each with its own world. To open one ends your run.</p>"
+      + QUESTIONS.map(({ id, title, ask, sub }) => `<button data-question="${id}" title="${ask} ${sub}">${title}</button>`).join("")
+      + '<button data-question="daily" title="Bring home the most food in 2000 ticks with at most ten rocks">Today’s map: ten rocks</button>'
+      + '<button id="train" title="Train the paper’s single ants, and compare how fast they learn">One ant, alone: learning curves</button>';
     this.begin();
     this.controls = new Controls(this);
     this.address = new Address(this);
@@ -71,7 +72,7 @@ class Lab {
     });
     byId("options").addEventListener("click", ({ target }) => { if (target.dataset.say) this.say(Number(target.dataset.say)); });
     byId("learned").addEventListener("click", () => this.showMind(true));
-    byId("mind").addEventListener("click", (event) => this.mindClick(event));
+    byId("mind").addEventListener("click", ({ target }) => { if (target.closest(".back")) this.showMind(false); });
   }
 
   get runs() { return this.sides.filter((side) => side.run).map((side) => side.run); }
@@ -102,7 +103,6 @@ class Lab {
     byId("figures").classList.toggle("two", starts.length > 1);
     byId("unit").innerHTML = starts.length < 2 ? "food per <br>minute" : "right, per minute";
     Object.assign(this.ui, { followed: -1, hero: -1, ghost: null });
-    this.plot.reset();
     [this.told, this.owed, this.fits] = ["", 0, false];
     if (!this.controls) return;
     this.controls.show();
@@ -254,7 +254,7 @@ class Lab {
     if (byId("sub").innerHTML !== told.sub) byId("sub").innerHTML = told.sub;
     byId("call").hidden = !told.call;
     if (byId("call").textContent !== (told.call || "")) byId("call").textContent = told.call || "";
-    ui.hero = told.id === "food" ? run.facts.firstAnt : -1; // who found food first is marked until it is home
+    ui.hero = told.id.startsWith("food") ? run.facts.firstAnt : -1; // who found food first is marked until it is home
     if (told.ghost && !ui.down && !this.film.copy) ui.ghost ||= run.suggestion();
     else ui.ghost = null;
     const rateOf = (one) => (this.question?.said < 0 ? "?" : many(one.perMinute)); // it would give the answer away
@@ -296,10 +296,6 @@ class Lab {
                          () => this.ui.arrows, (arrows) => { this.ui.arrows = arrows; });
     byId("table").innerHTML = mindOf(this.runs[this.runs.length - 1], this.ui);
     byId("mind").querySelector("button").focus();
-  }
-
-  mindClick({ target }) {
-    if (target.closest(".back")) this.showMind(false);
   }
 
   follow(ant) {

@@ -15,12 +15,7 @@ const textAt = (x, y, words, more = 'fill="var(--soft)"') => `<text x="${x}" y="
 
 export class Plot {
   /** @param {HTMLElement} box */
-  constructor(box) {
-    this.box = box;
-    this.most = 120; // of the axis, loads per minute
-  }
-
-  reset() { this.most = 120; }
+  constructor(box) { this.box = box; }
 
   /** @param {import("./run.js").Run[]} runs one or two; they may have started at different ticks, and are compared from there */
   draw(runs) {
@@ -28,12 +23,11 @@ export class Plot {
     const last = runs[0].tick, first = runs[0].start, span = Math.max(SHORTEST, Math.min(last - first, LONGEST)), from = Math.max(first, last - span);
     const ticks = Array.from({ length: Math.floor((last - from) / TICKS_A_SECOND) + 1 }, (_, k) => from + k * TICKS_A_SECOND);
     const values = runs.map((run) => ticks.map((t) => run.perMinuteAt(run.start - first + t)));
-    const wanted = Math.max(120, Math.ceil(Math.max(...values.flat()) / 60) * 60), middle = Math.round(this.most / 60) * 30;
-    this.most = wanted > this.most ? wanted : this.most + (wanted - this.most) * 0.12;
-    const x = (t) => (t - from) / span * (w - 2) + 1, y = (v) => bottom - v / this.most * (bottom - TOP);
+    const most = Math.max(120, Math.ceil(Math.max(...values.flat(), ...runs.map((run) => run.perMinute)) / 60) * 60); // of the axis, loads per minute
+    const x = (t) => (t - from) / span * (w - 2) + 1, y = (v) => bottom - v / most * (bottom - TOP);
     const lines = values.map((line) => line.map((v, k) => [x(ticks[k]), y(v)])), own = lines[lines.length - 1], two = runs.length > 1;
-    const parts = [0, middle].map((v) => `<path d="M0,${Math.round(y(v)) + 0.5}H${w}" stroke="var(--line)"/>`);
-    const words = [textAt(0, y(middle) - 4, middle), textAt(0, h - 3, clock(from - first)), textAt(w, h - 3, clock(from - first + span), 'fill="var(--soft)" text-anchor="end"')];
+    const parts = [0, most].map((v) => `<path d="M0,${Math.round(y(v)) + 0.5}H${w}" stroke="var(--line)"/>`);
+    const words = [textAt(0, TOP + 12, most), textAt(0, h - 3, clock(from - first)), textAt(w, h - 3, clock(from - first + span), 'fill="var(--soft)" text-anchor="end"')];
     if (ticks.length > 1) {
       const below = two ? [...lines[0]].reverse() : [[own[own.length - 1][0], bottom], [own[0][0], bottom]];
       parts.push(FADE, `<path d="M${through([...own, ...below])}Z" fill="${two ? "var(--accent)" : "url(#fade)"}" opacity=".2"/>`);

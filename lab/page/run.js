@@ -62,7 +62,7 @@ export class Run {
     this.total.push(this.engine.deliveries);
     if (facts.lanes < 0 && tick >= LANES.ticks && this.sum(LANES.ticks) >= LANES.loads) {
       facts.lanes = tick;
-      this.mark("lanes");
+      this.mark("lanes appear");
     }
     if (wall && wall.crossed && wall.detour < 0 && tick - wall.last >= STOPPED) wall.stopped = true;
   }

@@ -2,6 +2,8 @@
 
 import { TICKS_A_SECOND } from "./run.js";
 
+const UNTOUCHED = 150; // ticks of lanes without a wall until the page offers another thing to try
+
 export const many = (n) => Math.round(n).toLocaleString("en").replace(/,/g, "\u202f");
 export const bold = (text) => `<b>${text}</b>`;
 const plural = (n, word) => `${bold(many(n))} ${word}${n === 1 ? "" : "s"}`;
@@ -28,18 +30,21 @@ export function storyOf(run) {
   if (facts.lanes >= 0) {
     const each = 200 / Math.max(1, run.sum(200)) / TICKS_A_SECOND;
     return { id: "lanes", head: "Nobody told them the way.", call: "Draw a wall across it.", ghost: true,
-             sub: `It took them ${bold(seconds(facts.lanes))}. Now food comes home every ${bold(`${each.toFixed(2)} s`)}, `
-               + "along scent that they lay themselves." };
+             sub: `It took them ${bold(seconds(facts.lanes))}. Now food comes home every ${bold(`${each.toFixed(2)} s`)}`
+               + (run.tick - facts.lanes < UNTOUCHED ? ", along scent that they lay themselves."
+                 : ". None of this is built in: switch Learning off and start again, and hardly any comes.") };
   }
   if (facts.firstHome >= 0) {
-    return { id: "home", head: "One brought food home.",
+    const several = run.engine.deliveries > 1;
+    return { id: `home${several}`, head: several ? "They bring food home." : "One brought food home.",
              sub: `The first, after ${bold(seconds(facts.firstHome))}: 10 points. `
                + `What one ant learns, all ${many(run.engine.ants)} know.` };
   }
   if (facts.firstFood >= 0) {
-    return { id: "food", head: "One has found food.",
-             sub: `By chance, after ${bold(seconds(facts.firstFood))}. Picking it up pays 3 points, bringing it home 10. `
-               + "Now it has to find out what the nest is for." };
+    const { looks, ants } = run.engine, alone = looks.subarray(0, ants).filter((look) => look & 1).length < 2;
+    return { id: `food${alone}`, head: alone ? "One has found food." : "They have found food.",
+             sub: `The first by chance, after ${bold(seconds(facts.firstFood))}. Picking it up pays 3 points, bringing it home 10. `
+               + "What is the nest for? They have to find out." };
   }
   const n = run.engine.ants;
   return { id: "start", head: n === 1 ? "This ant knows nothing." : `These ${many(n)} ants know nothing.`,

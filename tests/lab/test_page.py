@@ -137,12 +137,19 @@ def opened(browser):
 @pytest.mark.browser
 def test_the_story_follows_what_ants_do(opened):
     page = opened()
-    page.read("lab.play(false); lab.begin()")  # on a busy machine, ants have already found food
-    assert page.words() == "These 64 ants know nothing."
+    page.read("lab.play(false); lab.begin([{ scene: { ...lab.runs[0].scene, seed: 1 } }])")
     assert page.until("lab.runs[0].facts.firstFood >= 0") == "One has found food."
+    page.read("lab.begin()")  # on a busy machine, ants have already found food
+    assert page.words() == "These 64 ants know nothing."
+    assert page.until("lab.runs[0].facts.firstFood >= 0") == "They have found food."  # two at once
     assert page.until("lab.runs[0].facts.firstHome >= 0") == "One brought food home."
+    assert page.until("lab.runs[0].engine.deliveries > 1") == "They bring food home."
     assert page.until("lab.runs[0].facts.lanes >= 0") == "Nobody told them the way."
     assert page.tab.inner_text("#call") == "Draw a wall across it."
+    axis = page.read("[...document.querySelectorAll('#plot text')].map((one) => one.textContent)")
+    assert max(int(word) for word in axis if word.isdigit()) >= page.read("lab.runs[0].perMinute")
+    page.until("lab.runs[0].tick >= lab.runs[0].facts.lanes + 150")
+    assert "switch Learning off" in page.tab.inner_text("#sub")
     page.drag(*page.read("lab.ui.ghost"))  # where the ghost draws
     page.tab.wait_for_function("lab.runs[0].engine.events.length > 0")
     assert page.until("lab.runs[0].tick > lab.runs[0].wall.last") == "Their way is blocked."
@@ -240,6 +247,8 @@ def test_each_control_changes_its_setting_now_or_at_a_restart(opened):
     for part, rules in [("directed", 6), ("rightOfWay", 4), ("seesAnts", 0)]:
         page.tab.click(f'[data-part="{part}"]') if page.tab.is_visible("#parts") else None
         assert page.read(f"{scene}.rules") == rules
+    page.tab.focus("#rules")  # as a finger does
+    assert page.tab.inner_text("#toast").startswith("Rules: what ants see")
     page.tab.click("#more summary")
     page.read(move, ["c-first", 2])
     page.tab.fill("#seed", "7")
@@ -424,6 +433,8 @@ def test_nothing_is_cut_off(opened, address):
         (840, 800),
         (1200, 800),
         (1260, 800),
+        (1280, 800),
+        (1366, 768),
     ):
         page.tab.set_viewport_size({"width": width, "height": height})
         page.read(TWO_FRAMES)
@@ -431,6 +442,8 @@ def test_nothing_is_cut_off(opened, address):
         bar = "document.querySelector('.bar')"
         assert page.read(f"{bar}.scrollWidth - {bar}.clientWidth") == 0, width
         assert page.read(CUT_OFF) == []
+        if width >= 840:  # the buttons at the end of the panel are on the first screen
+            assert page.read("verify.getBoundingClientRect().bottom <= innerHeight"), width
 
 
 @pytest.mark.browser
