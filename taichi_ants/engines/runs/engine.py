@@ -212,16 +212,16 @@ class Runs:
         """
         # Imported here, because Taichi must be configured first; see `runtime`.
         from taichi_ants.engines.launch import Launch, on_device
-        from taichi_ants.engines.runs.kernels import TOGETHER, run_kernel
+        from taichi_ants.engines.runs.kernels import LANES, run_kernel
         from taichi_ants.engines.runs.step import Rules
 
         task, state = self.task, self.state
         start_cells, headings = self.world.first_starts(words_of(self.seeds))
         settings = runtime.start()
-        # A few runs are faster one by one, each on its own thread.
-        several = len(self) > 2 * settings.threads and not traced and not runtime.compiles_for_gpu()
-        together = TOGETHER if several else 1
-        launch = Launch(partial(run_kernel, Rules.of(task), self.learner, traced, together))
+        # A few runs are faster one by one.
+        several = 2 * len(self) >= LANES * settings.threads
+        lanes = LANES if several and not traced and not runtime.compiles_for_gpu() else 1
+        launch = Launch(partial(run_kernel, Rules.of(task), self.learner, traced, lanes))
         falls = task.evaporation_in_training if self.learner else task.evaporation_in_evaluation
         common = {**laid_out([self.world], task, falls), "max_steps": self.max_steps}
 
@@ -233,11 +233,11 @@ class Runs:
 
         def launch_part(runs: slice, episodes: slice, **arrays: Any) -> None:
             n = runs.stop - runs.start
-            n_tasks = n if together == 1 else min(settings.threads, n)
+            n_tasks = n if lanes == 1 else min(settings.threads, n)
             values = {
                 "n_runs": n,
                 "n_tasks": n_tasks,
-                "begun": np.full(1, n_tasks * together, np.int32),  # runs
+                "begun": np.full(1, n_tasks * lanes, np.int32),  # runs
                 "n_episodes": episodes.stop - episodes.start,
                 "regrows": 0,  # food that grows back at once has no effect after a delivery
                 "start_cells": start_cells[runs],
@@ -253,7 +253,7 @@ class Runs:
                 "q": state.q[runs],
                 "floats": state.floats[runs],
                 "integers": state.integers[runs],
-                "cells": cells_of(n_tasks * together),
+                "cells": cells_of(n_tasks * lanes),
                 "keeps_tables": 0,  # 1 to write the table after each step
                 "outcomes": np.zeros((0, 0, 0), np.int32),  # (3, n, n_episodes): `OUTCOMES`
                 "trace": np.zeros((0, 0), np.int32),  # (n * n_episodes * max_steps, `TRACE`)

@@ -1,6 +1,11 @@
-"""The kernel of independent runs: whole episodes, with one parallel task per run.
+"""The kernel of independent runs: whole episodes, several runs at a time in each parallel task.
 
 The data of a run (cells, Q table, memory) are small enough for the processor's first cache.
+
+A task has a lane for each of its runs, and does each part of a step for all lanes in a loop. Loops
+without branches become vector instructions, so a step takes less than half of the time. Parts that
+have branches, or that write where other runs could read, have loops of their own. When no run is
+left for a lane, its ant goes on, but nothing is written.
 """
 
 from collections.abc import Callable
@@ -24,13 +29,32 @@ from taichi_ants.engines.layout import (
     RETURNS,
     STEPS,
 )
-from taichi_ants.engines.runs.step import Ant, Rules, act, ant_view, observe_function, restore
+from taichi_ants.engines.runs.step import (
+    Ant,
+    Rules,
+    act,
+    ant_view,
+    exchanges,
+    laid_behind,
+    move,
+    observe_function,
+    pick_up_or_give,
+    restore,
+)
 from taichi_ants.features import hooks_at
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner
-from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
+from taichi_ants.learners.memory import (
+    At,
+    LearnerArrays,
+    Transition,
+    error_function,
+    read_rates,
+    values_of,
+)
 from taichi_ants.task.constants import ROW, Event
 from taichi_ants.task.rules.actions import step_end
+from taichi_ants.task.rules.pheromone import FADING, NONE
 from taichi_ants.task.rules.policy import (
     BY_VALUES,
     best_actions,
@@ -39,26 +63,26 @@ from taichi_ants.task.rules.policy import (
     choose_in_crowd,
 )
 
+LANES = 16  # of a task on a CPU, if there are as many runs
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
 # indices are not negative.
 _PLACES = 2**30 - 1
 THREADS_OF_BLOCK = 32  # which a GPU starts together
-# Runs that a CPU thread takes in turns: each operation of a step waits for the one before, so a
-# processor that has several steps to do is busy while one of them waits.
-TOGETHER = 4
 
 
 @cache
 def _lanes_type(n: int) -> Any:
-    """Return the type of the runs of a task, in n lanes: vectors of what lasts between steps."""
+    """Return the type of what n lanes keep of their runs: vectors with an entry for each lane."""
     whole, real, word = (ti.types.vector(n, kind) for kind in (ti.i32, ti.f32, ti.u64))
     numbers = (
-        *("run", "episode", "step", "clock", "base", "cell", "heading", "carries", "carried"),
-        *("paper_state", "state", "action", "event", "next_state", "total", "recorded"),
+        *("run", "episode", "step", "clock", "total", "ended", "base", "table", "recorded"),
+        *("cell", "heading", "carries", "carried", "event", "paper_state", "state", "action"),
+        *("executed", "lays", "exchanges", "first", "last", "entry"),
+        *("next_state", "next_action", "terminated", "truncated"),
     )
     return ti.types.struct(
         **dict.fromkeys(numbers, whole),
-        **dict.fromkeys(("learning_rate", "discount", "epsilon"), real),
+        **dict.fromkeys(("learning_rate", "discount", "epsilon", "error", "updated"), real),
         **dict.fromkeys(("random_state", "explore_below"), word),
         chance=ti.types.vector(n, ti.f64),
     )
@@ -66,38 +90,31 @@ def _lanes_type(n: int) -> Any:
 
 @cache
 def run_kernel(
-    rules: Rules, learner: Learner | None, traced: bool, together: int, arguments: Any
+    rules: Rules, learner: Learner | None, traced: bool, n_lanes: int, arguments: Any
 ) -> Callable[..., None]:
     """Return the kernel for runs that learn, or that follow a fixed policy if `learner` is None.
 
-    A task takes `together` runs at a time, each in a lane, and another run when one has ended.
     Random draws are in the order of a colony's. If `traced`, the kernel also records each step, in
     `n_episodes * max_steps` rows per run. `arguments` is the type of the argument pack.
     """
     learns = learner is not None
     on_policy = learns and learner.draws_next_action
     begins = learns and learner.begin is not None
+    # Learners without memory compute all errors of a step before the first update.
+    at_once = learns and learner.td_error is not None and not learner.plans
     hyperparameters = learner.hyperparameters if learns else Hyperparameters
     read = read_rates(hyperparameters)
+    error_of = error_function(learner.td_error) if at_once else None
     columns = N_SETTINGS + len(fields(hyperparameters))
-    # The steps of one run repeat, but those of several runs cannot be predicted.
-    predictable = together == 1
-    observe, executes = observe_function(rules, predictable), hooks_at(rules.features)["execute"]
+    # A single lane has branches, which are faster where a learned policy repeats actions.
+    alone, deposit = n_lanes == 1, rules.deposit
+    observe, executes = observe_function(rules, alone), hooks_at(rules.features)["execute"]
     draw, chance_of_draw = BY_VALUES.get(rules.choice, (None, None))
     n_states = rules.observation.n_states
     table = n_states * ROW
     # A CPU distributes tasks one by one, as runs are uneven.
     block = THREADS_OF_BLOCK if has_guards(arguments) else 1
-    lanes_type = _lanes_type(together)
-
-    @ti.func
-    def at_of(a: ti.template(), run):
-        """Return the place of a run in the memory of learners."""
-        return At(
-            run * a.tables * table & _PLACES,
-            run * a.floats_by_8 * 8 & _PLACES,
-            run * a.integers_by_8 * 8 & _PLACES,
-        )
+    Lanes = _lanes_type(n_lanes)
 
     @ti.func
     def ant_of(lanes: ti.template(), k):
@@ -107,135 +124,213 @@ def run_kernel(
             heading=lanes.heading[k],
             carries=lanes.carries[k],
             carried=lanes.carried[k],
+            event=lanes.event[k],
             random_state=lanes.random_state[k],
         )
 
     @ti.func
+    def keep(lanes: ti.template(), k, ant):
+        """Make `ant` the ant in lane k."""
+        lanes.cell[k], lanes.heading[k] = ant.cell, ant.heading
+        lanes.carries[k], lanes.carried[k] = ant.carries, ant.carried
+        lanes.event[k], lanes.random_state[k] = ant.event, ant.random_state
+
+    @ti.func
     def decide(a: ti.template(), lanes: ti.template(), k, state):
-        """Draw the next action in lane k; if traced, also compute its probability."""
-        rng = advance(lanes.random_state[k])
-        lanes.random_state[k] = rng
-        values = values_of(a.q, lanes.run[k] * a.tables * table & _PLACES, state)
-        explore_below, action = lanes.explore_below[k], 0
+        """Return the next action in lane k, the stream after the draw, and its probability."""
+        rng, explore_below = advance(lanes.random_state[k]), lanes.explore_below[k]
+        values = values_of(a.q, lanes.table[k], state)
+        action, chance = 0, ti.f64(0.0)
         if ti.static(draw):
             ant = ant_of(lanes, k)
             action = draw(ant_view(a, ant), values, bits_of(rng), explore_below)
             if ti.static(traced):
-                lanes.chance[k] = chance_of_draw(ant_view(a, ant), values, action, explore_below)
+                chance = chance_of_draw(ant_view(a, ant), values, action, explore_below)
         else:
-            if ti.static(predictable):
+            if ti.static(alone):
                 action = choose(values, bits_of(rng), explore_below)
             else:
                 best = best_actions(values)
                 action = choose_in_crowd(a.compass, best, bits_of(rng), explore_below)
             if ti.static(traced):
-                lanes.chance[k] = chance_of(values, action, explore_below)
-        lanes.action[k] = action
+                chance = chance_of(values, action, explore_below)
+        return action, rng, chance
 
     @ti.func
     def begin_episode(a: ti.template(), memory: ti.template(), lanes: ti.template(), k):
         """Begin an episode in lane k, and a run if it is the first one."""
-        run, episode, base = lanes.run[k], lanes.episode[k], lanes.base[k]
-        if episode == 0:
+        run, base = ti.min(lanes.run[k], a.n_runs - 1), lanes.base[k]
+        if lanes.episode[k] == 0:
             lanes.random_state[k] = a.random_states[run]
+            lanes.table[k] = run * a.tables * table & _PLACES
             lanes.discount[k] = ti.cast(a.settings[run * columns + DISCOUNT], ti.f32)
             restore(a, base, 0, 0, a.size - 1)
         if ti.static(not learns):
-            lanes.random_state[k] = a.streams[run * a.n_episodes + episode]
+            lanes.random_state[k] = a.streams[run * a.n_episodes + lanes.episode[k]]
         if ti.static(begins):
-            learner.begin(memory, at_of(a, run))
+            if lanes.run[k] < a.n_runs:
+                learner.begin(memory, at_of(a, lanes, k))
         lanes.learning_rate[k] = ti.cast(a.learning_rate[run], ti.f32)
         lanes.epsilon[k] = ti.cast(a.epsilon[run], ti.f32)
         lanes.explore_below[k] = ti.cast(a.epsilon[run] * 4294967296.0, ti.u64)
-        lanes.cell[k], lanes.heading[k] = a.start_cells[run], a.start_headings[run]
-        lanes.carries[k], lanes.carried[k], lanes.clock[k], lanes.total[k] = 0, 0, 0, 0
-        lanes.paper_state[k], lanes.state[k], lanes.random_state[k] = observe(
-            a, base, ant_of(lanes, k), 0
-        )
+        lanes.step[k], lanes.clock[k], lanes.total[k] = 0, 0, 0
+        lanes.first[k], lanes.last[k] = a.size, -1
+        ant = Ant(cell=a.start_cells[run], heading=a.start_headings[run])
+        ant.random_state = lanes.random_state[k]
+        lanes.paper_state[k], lanes.state[k], ant.random_state = observe(a, base, ant, 0)
+        keep(lanes, k, ant)
         if ti.static(on_policy):
-            decide(a, lanes, k, lanes.state[k])
+            lanes.action[k], lanes.random_state[k], lanes.chance[k] = decide(
+                a, lanes, k, lanes.state[k]
+            )
 
     @ti.func
-    def move(a: ti.template(), memory: ti.template(), lanes: ti.template(), k):
-        """Do the first half of a step in lane k: choose, act and observe."""
-        if lanes.step[k] == 0:
-            begin_episode(a, memory, lanes, k)
-        if ti.static(not on_policy):
-            decide(a, lanes, k, lanes.state[k])
-        ant, base, clock = ant_of(lanes, k), lanes.base[k], lanes.clock[k]
-        paper_state, executed = lanes.paper_state[k], lanes.action[k]
-        for execute in ti.static(executes):
-            executed, ant.random_state = execute(ant_view(a, ant), executed, ant.random_state)
-        if ti.static(traced):
-            row = lanes.recorded[k]
-            a.trace_chances[row] = lanes.chance[k]
-            a.trace[row, 0], a.trace[row, 1] = lanes.episode[k], lanes.step[k]
-            a.trace[row, 2], a.trace[row, 3] = ant.cell, ant.heading
-            a.trace[row, 4], a.trace[row, 5] = paper_state, lanes.state[k]
-            a.trace[row, 6], a.trace[row, 12] = lanes.action[k], executed
-        ant = act(rules.deposit, predictable, a, base, ant, paper_state, executed, clock)
-        clock += a.evaporates
-        lanes.paper_state[k], lanes.next_state[k], lanes.random_state[k] = observe(
-            a, base, ant, clock
+    def at_of(a: ti.template(), lanes: ti.template(), k):
+        """Return the place of the run in lane k in the memory of learners."""
+        return At(
+            lanes.table[k],
+            lanes.run[k] * a.floats_by_8 * 8 & _PLACES,
+            lanes.run[k] * a.integers_by_8 * 8 & _PLACES,
         )
-        lanes.cell[k], lanes.heading[k], lanes.clock[k] = ant.cell, ant.heading, clock
-        lanes.carries[k], lanes.carried[k], lanes.event[k] = ant.carries, ant.carried, ant.event
 
     @ti.func
-    def learn(a: ti.template(), memory: ti.template(), lanes: ti.template(), k):
-        """Do the second half of a step in lane k, and return whether no run is left for it."""
-        run, event, action = lanes.run[k], lanes.event[k], lanes.action[k]
-        reward, next_state = a.rewards[event], lanes.next_state[k]
-        last = ti.cast(lanes.step[k] + 1 == a.max_steps, ti.i32)
-        terminated, truncated = step_end(event, a.delivery_terminates, 1, last)
-        next_action = -1
-        if ti.static(on_policy):
-            if terminated == 0:
-                decide(a, lanes, k, next_state)
-                next_action = lanes.action[k]
+    def record_choice(a: ti.template(), lanes: ti.template(), k, executed):
+        """Record what is known of a step before the action."""
+        row = lanes.recorded[k]
+        a.trace_chances[row] = lanes.chance[k]
+        a.trace[row, 0], a.trace[row, 1] = lanes.episode[k], lanes.step[k]
+        a.trace[row, 2], a.trace[row, 3] = lanes.cell[k], lanes.heading[k]
+        a.trace[row, 4], a.trace[row, 5] = lanes.paper_state[k], lanes.state[k]
+        a.trace[row, 6], a.trace[row, 12] = lanes.action[k], executed
+
+    @ti.func
+    def record_result(a: ti.template(), lanes: ti.template(), k):
+        """Record the rest of a step."""
+        row, event = lanes.recorded[k], lanes.event[k]
+        a.trace[row, 7], a.trace[row, 8] = a.rewards[event], lanes.paper_state[k]
+        a.trace[row, 9], a.trace[row, 10] = lanes.next_state[k], lanes.terminated[k]
+        a.trace[row, 11] = event
         if ti.static(learns):
-            at, rates = (
-                at_of(a, run),
-                read(
-                    lanes.learning_rate[k],
-                    lanes.discount[k],
-                    lanes.epsilon[k],
-                    a.settings,
-                    run * columns + N_SETTINGS,
-                ),
+            a.trace_errors[row] = lanes.error[k]
+            if a.keeps_tables == 1:
+                for i in range(table):
+                    a.trace_tables[row * table + i] = a.q[lanes.table[k] + i]
+        lanes.recorded[k] = row + 1
+
+    @ti.func
+    def settle(a: ti.template(), lanes: ti.template(), k):
+        """Let the ant in lane k deposit, pick up and give, after `move`."""
+        ant, base, clock = ant_of(lanes, k), lanes.base[k], lanes.clock[k]
+        if ti.static(deposit != NONE):  # no branch, because it could not be predicted
+            laid = laid_behind(deposit, a, base, ant, clock)
+            a.cells[base + ant.cell] = ti.select(
+                lanes.lays[k] == 1, laid, a.cells[base + ant.cell]
             )
-            taken = Transition(
-                state=lanes.state[k],
-                action=action,
-                reward=ti.cast(reward, ti.f32),
-                next_state=next_state,
-                next_action=next_action,
-                terminated=terminated,
-                truncated=truncated,
-            )
-            error, lanes.random_state[k] = learner.learn(
-                memory, at, taken, rates, lanes.random_state[k]
-            )
+        if lanes.exchanges[k] != 0:
+            seen, executed = lanes.paper_state[k], lanes.executed[k]
+            keep(lanes, k, pick_up_or_give(deposit, a, base, ant, seen, executed, clock))
+
+    @ti.func
+    def act_and_observe(a: ti.template(), lanes: ti.template()):
+        """Do the first half of a step: choose, act and observe."""
+        for k in range(n_lanes):
+            if ti.static(not on_policy):
+                lanes.action[k], lanes.random_state[k], lanes.chance[k] = decide(
+                    a, lanes, k, lanes.state[k]
+                )
+            ant, executed = ant_of(lanes, k), lanes.action[k]
+            for execute in ti.static(executes):
+                executed, ant.random_state = execute(ant_view(a, ant), executed, ant.random_state)
             if ti.static(traced):
-                row = lanes.recorded[k]
-                a.trace_errors[row] = error
-                if a.keeps_tables == 1:
-                    for i in range(table):
-                        a.trace_tables[row * table + i] = a.q[at.table + i]
-        if ti.static(traced):
-            row = lanes.recorded[k]
-            a.trace[row, 7], a.trace[row, 8] = reward, lanes.paper_state[k]
-            a.trace[row, 9], a.trace[row, 10] = next_state, terminated
-            a.trace[row, 11] = event
-            lanes.recorded[k] = row + 1
-        lanes.total[k] += reward
-        lanes.state[k] = next_state
-        lanes.step[k] += 1
-        is_over = 0
-        if (last == 1) | (event == Event.DELIVERED):
-            end_episode(a, lanes, k)
-            is_over = ti.cast(lanes.run[k] >= a.n_runs, ti.i32)
-        return is_over
+                record_choice(a, lanes, k, executed)
+            if ti.static(alone):
+                ant = act(
+                    *(deposit, True, a, lanes.base[k], ant),
+                    *(lanes.paper_state[k], executed, lanes.clock[k]),
+                )
+            else:
+                ant, enters = move(a, ant, lanes.paper_state[k], executed)
+                lanes.lays[k] = enters & ant.carries
+                lanes.exchanges[k] = exchanges(lanes.paper_state[k], executed)
+                lanes.executed[k] = executed
+                lays = lanes.lays[k] == 1
+                lanes.first[k] = ti.min(lanes.first[k], ti.select(lays, ant.cell, a.size))
+                lanes.last[k] = ti.max(lanes.last[k], ti.select(lays, ant.cell, -1))
+            keep(lanes, k, ant)
+        if ti.static(not alone):
+            for k in range(n_lanes):
+                settle(a, lanes, k)
+        for k in range(n_lanes):
+            if ti.static(deposit == FADING and not alone):
+                lanes.carried[k] = (lanes.carried[k] + 1) * lanes.carries[k]
+            lanes.clock[k] += a.evaporates
+            lanes.paper_state[k], lanes.next_state[k], lanes.random_state[k] = observe(
+                a, lanes.base[k], ant_of(lanes, k), lanes.clock[k]
+            )
+
+    @ti.func
+    def learn(a: ti.template(), memory: ti.template(), lanes: ti.template()):
+        """Do the second half of a step, and return the number of episodes that end with it."""
+        ends = 0
+        for k in range(n_lanes):
+            event, last = lanes.event[k], ti.cast(lanes.step[k] + 1 == a.max_steps, ti.i32)
+            lanes.terminated[k], lanes.truncated[k] = step_end(
+                event, a.delivery_terminates, 1, last
+            )
+            lanes.next_action[k] = -1
+            if ti.static(on_policy):
+                drawn = lanes.terminated[k] == 0
+                action, rng, lanes.chance[k] = decide(a, lanes, k, lanes.next_state[k])
+                lanes.next_action[k] = ti.select(drawn, action, -1)
+                lanes.random_state[k] = ti.select(drawn, rng, lanes.random_state[k])
+            if ti.static(at_once):
+                rates = rates_of(a, lanes, k)
+                lanes.entry[k], value, lanes.error[k] = error_of(
+                    memory, lanes.table[k], taken_in(a, lanes, k), rates
+                )
+                lanes.updated[k] = value + rates.learning_rate * lanes.error[k]
+        for k in range(n_lanes):
+            if lanes.run[k] < a.n_runs:
+                if ti.static(at_once):
+                    a.q[lanes.entry[k]] = lanes.updated[k]
+                elif ti.static(learns):
+                    lanes.error[k], lanes.random_state[k] = learner.learn(
+                        *(memory, at_of(a, lanes, k), taken_in(a, lanes, k)),
+                        *(rates_of(a, lanes, k), lanes.random_state[k]),
+                    )
+                if ti.static(traced):
+                    record_result(a, lanes, k)
+        for k in range(n_lanes):
+            lanes.total[k] += a.rewards[lanes.event[k]]
+            lanes.state[k] = lanes.next_state[k]
+            if ti.static(on_policy):
+                lanes.action[k] = lanes.next_action[k]
+            lanes.step[k] += 1
+            is_over = (lanes.event[k] == Event.DELIVERED) | (lanes.step[k] == a.max_steps)
+            lanes.ended[k] = ti.cast(is_over & (lanes.run[k] < a.n_runs), ti.i32)
+            ends += lanes.ended[k]
+        return ends
+
+    @ti.func
+    def rates_of(a: ti.template(), lanes: ti.template(), k):
+        """Return the rates of the run in lane k."""
+        return read(
+            *(lanes.learning_rate[k], lanes.discount[k], lanes.epsilon[k]),
+            *(a.settings, lanes.run[k] * columns + N_SETTINGS),
+        )
+
+    @ti.func
+    def taken_in(a: ti.template(), lanes: ti.template(), k):
+        """Return the step that was taken in lane k."""
+        return Transition(
+            state=lanes.state[k],
+            action=lanes.action[k],
+            reward=ti.cast(a.rewards[lanes.event[k]], ti.f32),
+            next_state=lanes.next_state[k],
+            next_action=lanes.next_action[k],
+            terminated=lanes.terminated[k],
+            truncated=lanes.truncated[k],
+        )
 
     @ti.func
     def end_episode(a: ti.template(), lanes: ti.template(), k):
@@ -244,37 +339,45 @@ def run_kernel(
         a.outcomes[RETURNS, run, episode] = lanes.total[k]
         a.outcomes[STEPS, run, episode] = lanes.step[k]
         a.outcomes[DELIVERIES, run, episode] = ti.cast(lanes.event[k] == Event.DELIVERED, ti.i32)
-        restore(a, base, 0, a.cells[base + a.size], a.cells[base + a.size + 1])
-        first = run * columns
+        first = ti.min(lanes.first[k], a.cells[base + a.size])
+        restore(a, base, 0, first, ti.max(lanes.last[k], a.cells[base + a.size + 1]))
+        settings = run * columns
         a.epsilon[run] = ti.max(
-            a.settings[first + MIN_EPSILON], a.epsilon[run] * a.settings[first + EPSILON_DECAY]
+            a.settings[settings + MIN_EPSILON],
+            a.epsilon[run] * a.settings[settings + EPSILON_DECAY],
         )
         a.learning_rate[run] = ti.max(
-            a.settings[first + MIN_LEARNING_RATE],
-            a.learning_rate[run] * a.settings[first + LEARNING_RATE_DECAY],
+            a.settings[settings + MIN_LEARNING_RATE],
+            a.learning_rate[run] * a.settings[settings + LEARNING_RATE_DECAY],
         )
-        lanes.episode[k], lanes.step[k] = episode + 1, 0
+        lanes.episode[k] = episode + 1
         if episode + 1 == a.n_episodes:
             a.random_states[run] = lanes.random_state[k]
             lanes.run[k], lanes.episode[k] = ti.atomic_add(a.begun[0], 1), 0
+            lanes.recorded[k] = lanes.run[k] * a.n_episodes * a.max_steps
 
     @ti.kernel
     def do_runs(a: arguments):
         memory = ti.static(LearnerArrays(a.q, a.floats, a.integers, n_states))
         ti.loop_config(block_dim=block)
         for task in range(a.n_tasks):
-            lanes, active = lanes_type(), 0
-            for k in range(together):
+            lanes, ends, active = Lanes(), n_lanes, 1
+            for k in range(n_lanes):
                 run = task + k * a.n_tasks
                 lanes.run[k], lanes.base[k] = run, run * (a.size + EXTRA_CELLS)
                 lanes.recorded[k] = run * a.n_episodes * a.max_steps
-                active += ti.cast(run < a.n_runs, ti.i32)
+                lanes.ended[k] = 1
             while active > 0:
-                for k in range(together):
-                    if lanes.run[k] < a.n_runs:
-                        move(a, memory, lanes, k)
-                for k in range(together):
-                    if lanes.run[k] < a.n_runs:
-                        active -= learn(a, memory, lanes, k)
+                if ends > 0:
+                    active = 0
+                    for k in range(n_lanes):
+                        if lanes.ended[k] == 1:
+                            if lanes.step[k] > 0:
+                                end_episode(a, lanes, k)
+                            begin_episode(a, memory, lanes, k)
+                        active += ti.cast(lanes.run[k] < a.n_runs, ti.i32)
+                if active > 0:
+                    act_and_observe(a, lanes)
+                    ends = learn(a, memory, lanes)
 
     return do_runs

@@ -261,19 +261,45 @@ def act(
         else:
             after = pick_up_or_give(deposit, a, base, ant, paper_state, action, clock)
     else:
-        moves = MOVES >> action & 1
-        enters = moves & ti.cast(is_open(code), ti.i32)
-        after.heading = turned_by(a.compass, ant.heading, action)
-        after.event = ti.select(moves == 1, move_event(code), Event.FAILED)
-        after.cell += enters * step_towards(a.compass, ant.heading, action)
+        after, enters = move(a, ant, paper_state, action)
         if enters & ant.carries == 1:
             lay_behind(deposit, a, base, after.cell, clock, ant.carried)
-        # One test, which is rarely true; that of `moves` would be a branch that nothing predicts.
-        if vision.goals_as_seen(paper_state) & -(action + 1 >> 2) != 0:
+        if exchanges(paper_state, action) != 0:
             after = pick_up_or_give(deposit, a, base, ant, paper_state, action, clock)
     if ti.static(deposit == FADING):
         after.carried = (ant.carried + 1) * after.carries
     return after
+
+
+@ti.func
+def move(a: ti.template(), ant, paper_state, action):
+    """Return the ant after a move, without branches, and 1 if it enters a cell.
+
+    Another action is a `FAILED` one, unless `pick_up_or_give` follows.
+    """
+    after, code = ant, vision.code_in_view(paper_state, action)
+    moves = MOVES >> action & 1
+    enters = moves & ti.cast(is_open(code), ti.i32)
+    after.heading = turned_by(a.compass, ant.heading, action)
+    after.event = ti.select(moves == 1, move_event(code), Event.FAILED)
+    after.cell += enters * step_towards(a.compass, ant.heading, action)
+    return after, enters
+
+
+@ti.func
+def exchanges(paper_state, action):
+    """Return a number that is not 0 if an ant that sees food or the queen picks up or gives.
+
+    It needs one comparison, which is rarely true. Nothing could predict whether the action moves.
+    """
+    return vision.goals_as_seen(paper_state) & -((action + 1) >> 2)
+
+
+@ti.func
+def laid_behind(deposit: ti.template(), a: ti.template(), base, ant, clock):
+    """Return the cell that an ant with food has entered, after its deposit."""
+    level = level_left(a.cells[base + ant.cell], clock)
+    return clock + level_after_deposit(a, deposit, level, ant.carried)
 
 
 @ti.func
