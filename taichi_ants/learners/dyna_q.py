@@ -9,24 +9,32 @@ from taichi_ants.task.constants import ROW
 
 
 @kernel_function
-def update(memory, at, rates, pair, transition):
-    """Update a pair and return its TD error."""
+def remember(memory, at, step, rates):
+    """Update from the step, store it in the model, and return its TD error."""
+    pair = step.state * ROW + step.action
+    transition = model.pack_transition(step.next_state, step.reward, step.terminated)
     error = model.error_of(memory, at, rates, pair, transition)
     memory.q[at.table + pair] = memory.q[at.table + pair] + rates.learning_rate * error
+    model.remember(memory, at, pair, transition)
     return error
+
+
+@kernel_function
+def replay(memory, at, rates, slot):
+    """Return the place of the value of a pair in the model, and the value after an update."""
+    pair, transition = model.recall(memory, at, slot)
+    error = model.error_of(memory, at, rates, pair, transition)
+    return at.table + pair, memory.q[at.table + pair] + rates.learning_rate * error
 
 
 def learn(memory, at, step, rates, random_state):
     """Update from the step, then from random pairs of the model."""
-    pair = step.state * ROW + step.action
-    transition = model.pack_transition(step.next_state, step.reward, step.terminated)
-    error = update(memory, at, rates, pair, transition)
-    model.remember(memory, at, pair, transition)
+    error = remember(memory, at, step, rates)
     rng, n_visited = random_state, model.visited(memory, at)
     for _ in range(rates.planning_steps):
         rng = advance(rng)
-        drawn, seen = model.recall(memory, at, below(high_word(bits_of(rng)), n_visited))
-        update(memory, at, rates, drawn, seen)
+        entry, value = replay(memory, at, rates, below(high_word(bits_of(rng)), n_visited))
+        memory.q[entry] = value
     return error, rng
 
 
@@ -34,6 +42,7 @@ DYNA_Q = Learner(
     "dyna_q",
     learn,
     td_error=td_error,
+    parts=(remember, replay),
     plans=True,
     hyperparameters=model.Planning,
     memory=lambda settings, n_states: model.model_memory(n_states),

@@ -14,8 +14,9 @@ from functools import cache
 from typing import Any
 
 import taichi as ti
+from taichi.math import popcnt
 
-from taichi_ants.arithmetic.random_bits import advance, bits_of
+from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word, low_word
 from taichi_ants.engines.launch import has_guards
 from taichi_ants.engines.layout import (
     DELIVERIES,
@@ -42,6 +43,7 @@ from taichi_ants.engines.runs.step import (
     restore,
 )
 from taichi_ants.features import hooks_at
+from taichi_ants.learners import model
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import (
@@ -52,15 +54,14 @@ from taichi_ants.learners.memory import (
     read_rates,
     values_of,
 )
-from taichi_ants.task.constants import ROW, Event
-from taichi_ants.task.rules.actions import step_end
+from taichi_ants.task.constants import N_ACTIONS, ROW, Event
+from taichi_ants.task.rules.actions import bit_number_in, step_end
 from taichi_ants.task.rules.pheromone import FADING, NONE
 from taichi_ants.task.rules.policy import (
     BY_VALUES,
     best_actions,
     chance_of,
     choose,
-    choose_in_crowd,
 )
 
 LANES = 16  # of a task on a CPU, if there are as many runs
@@ -77,13 +78,14 @@ def _lanes_type(n: int) -> Any:
     numbers = (
         *("run", "episode", "step", "clock", "total", "ended", "base", "table", "recorded"),
         *("cell", "heading", "carries", "carried", "event", "paper_state", "state", "action"),
-        *("executed", "lays", "exchanges", "first", "last", "entry"),
+        *("executed", "lays", "exchanges", "first", "last", "entry", "floats", "integers"),
+        *("explores", "choices", "n_choices"),
         *("next_state", "next_action", "terminated", "truncated"),
     )
     return ti.types.struct(
         **dict.fromkeys(numbers, whole),
         **dict.fromkeys(("learning_rate", "discount", "epsilon", "error", "updated"), real),
-        **dict.fromkeys(("random_state", "explore_below"), word),
+        **dict.fromkeys(("random_state", "explore_below", "word"), word),
         chance=ti.types.vector(n, ti.f64),
     )
 
@@ -108,8 +110,11 @@ def run_kernel(
     columns = N_SETTINGS + len(fields(hyperparameters))
     # A single lane has branches, which are faster where a learned policy repeats actions.
     alone, deposit = n_lanes == 1, rules.deposit
+    remember, replay = (learner.parts if learns and not alone else None) or (None, None)
+    replays = replay is not None
     observe, executes = observe_function(rules, alone), hooks_at(rules.features)["execute"]
     draw, chance_of_draw = BY_VALUES.get(rules.choice, (None, None))
+    by_one = alone or draw is not None  # whether ants choose one after the other
     n_states = rules.observation.n_states
     table = n_states * ROW
     # A CPU distributes tasks one by one, as runs are uneven.
@@ -147,14 +152,38 @@ def run_kernel(
             if ti.static(traced):
                 chance = chance_of_draw(ant_view(a, ant), values, action, explore_below)
         else:
-            if ti.static(alone):
-                action = choose(values, bits_of(rng), explore_below)
-            else:
-                best = best_actions(values)
-                action = choose_in_crowd(a.compass, best, bits_of(rng), explore_below)
+            action = choose(values, bits_of(rng), explore_below)
             if ti.static(traced):
                 chance = chance_of(values, action, explore_below)
         return action, rng, chance
+
+    @ti.func
+    def decide_all(
+        a: ti.template(), lanes: ti.template(), states: ti.template(), actions: ti.template()
+    ):
+        """Draw the next actions in these `states`; an ant whose episode has terminated needs none.
+
+        Numbers of 64 bits and of 32 bits are in separate loops, for twice as wide vectors.
+        """
+        for k in range(n_lanes):
+            rng = advance(lanes.random_state[k])
+            bits = bits_of(rng)
+            lanes.word[k] = low_word(bits)
+            lanes.explores[k] = ti.cast(high_word(bits) < lanes.explore_below[k], ti.i32)
+            if ti.static(on_policy):
+                rng = ti.select(lanes.terminated[k] == 1, lanes.random_state[k], rng)
+            lanes.random_state[k] = rng
+        for k in range(n_lanes):
+            best = best_actions(values_of(a.q, lanes.table[k], states[k]))
+            lanes.choices[k] = ti.select(lanes.explores[k] == 1, (1 << N_ACTIONS) - 1, best)
+            lanes.n_choices[k] = popcnt(lanes.choices[k])
+        for k in range(n_lanes):
+            lanes.n_choices[k] = below(lanes.word[k], lanes.n_choices[k])
+        for k in range(n_lanes):
+            action = bit_number_in(a.compass, lanes.choices[k], lanes.n_choices[k])
+            if ti.static(on_policy):
+                action = ti.select(lanes.terminated[k] == 1, -1, action)
+            actions[k] = action
 
     @ti.func
     def begin_episode(a: ti.template(), memory: ti.template(), lanes: ti.template(), k):
@@ -163,13 +192,15 @@ def run_kernel(
         if lanes.episode[k] == 0:
             lanes.random_state[k] = a.random_states[run]
             lanes.table[k] = run * a.tables * table & _PLACES
+            lanes.floats[k] = run * a.floats_by_8 * 8 & _PLACES
+            lanes.integers[k] = run * a.integers_by_8 * 8 & _PLACES
             lanes.discount[k] = ti.cast(a.settings[run * columns + DISCOUNT], ti.f32)
             restore(a, base, 0, 0, a.size - 1)
         if ti.static(not learns):
             lanes.random_state[k] = a.streams[run * a.n_episodes + lanes.episode[k]]
         if ti.static(begins):
             if lanes.run[k] < a.n_runs:
-                learner.begin(memory, at_of(a, lanes, k))
+                learner.begin(memory, at_of(lanes, k))
         lanes.learning_rate[k] = ti.cast(a.learning_rate[run], ti.f32)
         lanes.epsilon[k] = ti.cast(a.epsilon[run], ti.f32)
         lanes.explore_below[k] = ti.cast(a.epsilon[run] * 4294967296.0, ti.u64)
@@ -185,13 +216,9 @@ def run_kernel(
             )
 
     @ti.func
-    def at_of(a: ti.template(), lanes: ti.template(), k):
+    def at_of(lanes: ti.template(), k):
         """Return the place of the run in lane k in the memory of learners."""
-        return At(
-            lanes.table[k],
-            lanes.run[k] * a.floats_by_8 * 8 & _PLACES,
-            lanes.run[k] * a.integers_by_8 * 8 & _PLACES,
-        )
+        return At(lanes.table[k], lanes.floats[k], lanes.integers[k])
 
     @ti.func
     def record_choice(a: ti.template(), lanes: ti.template(), k, executed):
@@ -233,8 +260,10 @@ def run_kernel(
     @ti.func
     def act_and_observe(a: ti.template(), lanes: ti.template()):
         """Do the first half of a step: choose, act and observe."""
+        if ti.static(not on_policy and not by_one):
+            decide_all(a, lanes, lanes.state, lanes.action)
         for k in range(n_lanes):
-            if ti.static(not on_policy):
+            if ti.static(not on_policy and by_one):
                 lanes.action[k], lanes.random_state[k], lanes.chance[k] = decide(
                     a, lanes, k, lanes.state[k]
                 )
@@ -278,11 +307,14 @@ def run_kernel(
                 event, a.delivery_terminates, 1, last
             )
             lanes.next_action[k] = -1
-            if ti.static(on_policy):
-                drawn = lanes.terminated[k] == 0
-                action, rng, lanes.chance[k] = decide(a, lanes, k, lanes.next_state[k])
-                lanes.next_action[k] = ti.select(drawn, action, -1)
-                lanes.random_state[k] = ti.select(drawn, rng, lanes.random_state[k])
+        if ti.static(on_policy and not by_one):
+            decide_all(a, lanes, lanes.next_state, lanes.next_action)
+        for k in range(n_lanes):
+            if ti.static(on_policy and by_one):
+                if lanes.terminated[k] == 0:
+                    lanes.next_action[k], lanes.random_state[k], lanes.chance[k] = decide(
+                        a, lanes, k, lanes.next_state[k]
+                    )
             if ti.static(at_once):
                 rates = rates_of(a, lanes, k)
                 lanes.entry[k], value, lanes.error[k] = error_of(
@@ -293,13 +325,18 @@ def run_kernel(
             if lanes.run[k] < a.n_runs:
                 if ti.static(at_once):
                     a.q[lanes.entry[k]] = lanes.updated[k]
+                elif ti.static(replays):
+                    remember(*(memory, at_of(lanes, k), taken_in(a, lanes, k), rates_of(a, lanes, k)))
                 elif ti.static(learns):
                     lanes.error[k], lanes.random_state[k] = learner.learn(
-                        *(memory, at_of(a, lanes, k), taken_in(a, lanes, k)),
+                        *(memory, at_of(lanes, k), taken_in(a, lanes, k)),
                         *(rates_of(a, lanes, k), lanes.random_state[k]),
                     )
                 if ti.static(traced):
                     record_result(a, lanes, k)
+        if ti.static(replays):
+            for _ in range(rates_of(a, lanes, 0).planning_steps):
+                replay_all(a, memory, lanes)
         for k in range(n_lanes):
             lanes.total[k] += a.rewards[lanes.event[k]]
             lanes.state[k] = lanes.next_state[k]
@@ -310,6 +347,22 @@ def run_kernel(
             lanes.ended[k] = ti.cast(is_over & (lanes.run[k] < a.n_runs), ti.i32)
             ends += lanes.ended[k]
         return ends
+
+    @ti.func
+    def replay_all(a: ti.template(), memory: ti.template(), lanes: ti.template()):
+        """Update a pair from each model."""
+        for k in range(n_lanes):
+            rng = advance(lanes.random_state[k])
+            lanes.random_state[k] = rng
+            n_visited = model.visited(memory, at_of(lanes, k))
+            lanes.entry[k] = below(high_word(bits_of(rng)), n_visited)
+        for k in range(n_lanes):
+            lanes.entry[k], lanes.updated[k] = replay(
+                memory, at_of(lanes, k), rates_of(a, lanes, k), lanes.entry[k]
+            )
+        for k in range(n_lanes):
+            if lanes.run[k] < a.n_runs:
+                a.q[lanes.entry[k]] = lanes.updated[k]
 
     @ti.func
     def rates_of(a: ti.template(), lanes: ti.template(), k):
@@ -372,6 +425,7 @@ def run_kernel(
                     active = 0
                     for k in range(n_lanes):
                         if lanes.ended[k] == 1:
+                            lanes.terminated[k] = 0
                             if lanes.step[k] > 0:
                                 end_episode(a, lanes, k)
                             begin_episode(a, memory, lanes, k)
