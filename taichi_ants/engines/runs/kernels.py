@@ -79,6 +79,7 @@ def _lanes_type(n: int) -> Any:
         *("run", "episode", "step", "clock", "total", "ended", "base", "table", "recorded"),
         *("cell", "heading", "carries", "carried", "event", "paper_state", "state", "action"),
         *("executed", "lays", "exchanges", "first", "last", "entry", "floats", "integers"),
+        "settings",
         *("explores", "choices", "n_choices"),
         *("next_state", "next_action", "terminated", "truncated"),
     )
@@ -192,6 +193,7 @@ def run_kernel(
         if lanes.episode[k] == 0:
             lanes.random_state[k] = a.random_states[run]
             lanes.table[k] = run * a.tables * table & _PLACES
+            lanes.settings[k] = run * columns
             lanes.floats[k] = run * a.floats_by_8 * 8 & _PLACES
             lanes.integers[k] = run * a.integers_by_8 * 8 & _PLACES
             lanes.discount[k] = ti.cast(a.settings[run * columns + DISCOUNT], ti.f32)
@@ -369,7 +371,7 @@ def run_kernel(
         """Return the rates of the run in lane k."""
         return read(
             *(lanes.learning_rate[k], lanes.discount[k], lanes.epsilon[k]),
-            *(a.settings, lanes.run[k] * columns + N_SETTINGS),
+            *(a.settings, lanes.settings[k] + N_SETTINGS),
         )
 
     @ti.func
