@@ -4,6 +4,7 @@ from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_wor
 from taichi_ants.kernel_functions import kernel_function
 from taichi_ants.learners import model
 from taichi_ants.learners.learner import Learner
+from taichi_ants.learners.memory import update
 from taichi_ants.learners.q_learning import td_error
 from taichi_ants.task.constants import ROW
 
@@ -14,7 +15,7 @@ def remember(memory, at, step, rates):
     pair = step.state * ROW + step.action
     transition = model.pack_transition(step.next_state, step.reward, step.terminated)
     error = model.error_of(memory, at, rates, pair, transition)
-    memory.q[at.table + pair] = memory.q[at.table + pair] + rates.learning_rate * error
+    update(memory, at.table + pair, memory.q[at.table + pair] + rates.learning_rate * error)
     model.remember(memory, at, pair, transition)
     return error
 
@@ -34,7 +35,7 @@ def learn(memory, at, step, rates, random_state):
     for _ in range(rates.planning_steps):
         rng = advance(rng)
         entry, value = replay(memory, at, rates, below(high_word(bits_of(rng)), n_visited))
-        memory.q[entry] = value
+        update(memory, entry, value)
     return error, rng
 
 

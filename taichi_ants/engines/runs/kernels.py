@@ -52,6 +52,7 @@ from taichi_ants.learners.memory import (
     Transition,
     error_function,
     read_rates,
+    update,
     values_of,
 )
 from taichi_ants.task.constants import N_ACTIONS, ROW, Event
@@ -64,10 +65,11 @@ from taichi_ants.task.rules.policy import (
     choose,
 )
 
-LANES = 16  # of a task on a CPU, if there are as many runs
+import os
+LANES = int(os.environ.get('NL','16'))  # of a task on a CPU, if there are as many runs
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
 # indices are not negative.
-_PLACES = 2**30 - 1
+_PLACES = 2**30 - 8
 THREADS_OF_BLOCK = 32  # which a GPU starts together
 
 
@@ -198,6 +200,11 @@ def run_kernel(
             lanes.integers[k] = run * a.integers_by_8 * 8 & _PLACES
             lanes.discount[k] = ti.cast(a.settings[run * columns + DISCOUNT], ti.f32)
             restore(a, base, 0, 0, a.size - 1)
+            if ti.static(replays):
+                if lanes.run[k] < a.n_runs:
+                    for state in range(n_states):
+                        first = lanes.table[k] + state * ROW
+                        update(memory, first, a.q[first])
         if ti.static(not learns):
             lanes.random_state[k] = a.streams[run * a.n_episodes + lanes.episode[k]]
         if ti.static(begins):
@@ -220,7 +227,9 @@ def run_kernel(
     @ti.func
     def at_of(lanes: ti.template(), k):
         """Return the place of the run in lane k in the memory of learners."""
-        return At(lanes.table[k], lanes.floats[k], lanes.integers[k])
+        return At(
+            lanes.table[k] & _PLACES, lanes.floats[k] & _PLACES, lanes.integers[k] & _PLACES
+        )
 
     @ti.func
     def record_choice(a: ti.template(), lanes: ti.template(), k, executed):
@@ -364,7 +373,7 @@ def run_kernel(
             )
         for k in range(n_lanes):
             if lanes.run[k] < a.n_runs:
-                a.q[lanes.entry[k]] = lanes.updated[k]
+                update(memory, lanes.entry[k], lanes.updated[k])
 
     @ti.func
     def rates_of(a: ti.template(), lanes: ti.template(), k):
@@ -408,12 +417,15 @@ def run_kernel(
         lanes.episode[k] = episode + 1
         if episode + 1 == a.n_episodes:
             a.random_states[run] = lanes.random_state[k]
+            if ti.static(replays):
+                for state in range(n_states):
+                    a.q[lanes.table[k] + state * ROW + N_ACTIONS] = 0.0
             lanes.run[k], lanes.episode[k] = ti.atomic_add(a.begun[0], 1), 0
             lanes.recorded[k] = lanes.run[k] * a.n_episodes * a.max_steps
 
     @ti.kernel
     def do_runs(a: arguments):
-        memory = ti.static(LearnerArrays(a.q, a.floats, a.integers, n_states))
+        memory = ti.static(LearnerArrays(a.q, a.floats, a.integers, n_states, replays))
         ti.loop_config(block_dim=block)
         for task in range(a.n_tasks):
             lanes, ends, active = Lanes(), n_lanes, 1
