@@ -44,9 +44,6 @@ class Learner:
         plans: Whether the learner has a model, `taichi_ants.learners.model`, and the hyperparameter
             `planning_steps`. Ants that share a table share the model, and td_error must not use the
             next action.
-        parts: The functions `remember` and `replay` of Dyna-Q, if `learn` consists of one call of the
-            first and `planning_steps` calls of the second, else None. They let a kernel plan for
-            several runs together.
         hyperparameters: The class of its hyperparameters, all with default values.
         memory: A function (hyperparameters, n_states) -> Memory.
         cost: A function (hyperparameters) -> float: the time of one step, relative to Q-learning.
@@ -60,7 +57,6 @@ class Learner:
     td_error: Any = None
     draws_next_action: bool = False
     plans: bool = False
-    parts: Any = None
     hyperparameters: type[Hyperparameters] = Hyperparameters
     memory: Callable[[Any, int], Memory] = lambda settings, n_states: Memory()
     cost: Callable[[Any], float] = lambda settings: 1.0

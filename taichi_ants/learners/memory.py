@@ -11,7 +11,6 @@ from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.settings import declared
 from taichi_ants.task.constants import N_ACTIONS, ROW
-from taichi_ants.task.rules.policy import best_value
 
 
 class LearnerArrays(NamedTuple):
@@ -19,14 +18,13 @@ class LearnerArrays(NamedTuple):
 
     `q`, f32, has tables of n_states rows of `ROW` numbers, of which the first 5 are action values.
     The table that a run acts by precedes its additional tables. `floats` are f32, `integers` i32,
-    and n_states is a Python int. If `notes`, the number after the action values is the largest.
+    and n_states is a Python int.
     """
 
     q: Any
     floats: Any
     integers: Any
     n_states: int
-    notes: bool = False
 
 
 # The offset of the memory of one run in each of these arrays. Its additional table k (from 1) is at
@@ -76,26 +74,6 @@ def values_of(q: ti.template(), table, state):
     """Return the five action values of a state in the table at offset `table`."""
     row = (table + state * ROW) & _ROWS
     return ti.Vector([q[row + a] for a in ti.static(range(N_ACTIONS))])
-
-
-@ti.func
-def best_of(memory: ti.template(), table, state):
-    """Return the largest action value of a state in the table at offset `table`."""
-    best = ti.f32(0.0)
-    if ti.static(memory.notes):
-        best = memory.q[((table + state * ROW) & _ROWS) + N_ACTIONS]
-    else:
-        best = best_value(values_of(memory.q, table, state))
-    return best
-
-
-@ti.func
-def update(memory: ti.template(), entry, value):
-    """Set the action value at index `entry`."""
-    memory.q[entry] = value
-    if ti.static(memory.notes):
-        row = entry & _ROWS
-        memory.q[row + N_ACTIONS] = best_value(values_of(memory.q, row, 0))
 
 
 @ti.func

@@ -12,9 +12,10 @@ import taichi as ti
 
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Memory
-from taichi_ants.learners.memory import best_of
+from taichi_ants.learners.memory import values_of
 from taichi_ants.settings import Setting
 from taichi_ants.task.constants import MOST_REWARD, N_ACTIONS, ROW
+from taichi_ants.task.rules.policy import best_value
 
 # A transition packs the next state (20 bits), the reward (11 bits) and whether the step terminated.
 _REWARD_AT, _TERMINATED_AT = 20, 31
@@ -93,8 +94,8 @@ def recall(memory: ti.template(), at, slot):
 @ti.func
 def error_of(memory: ti.template(), at, rates, pair, transition):
     """Return the TD error of Q-learning for a transition of a pair."""
-    reward, best = reward_of(transition), best_of(memory, at.table, next_state_of(transition))
-    target = reward + rates.discount * best
-    # A selection is faster than a branch where kernels do this for several runs.
-    target = ti.select(terminated_of(transition) == 1, reward, target)
+    target = reward_of(transition)
+    if terminated_of(transition) == 0:
+        next_values = values_of(memory.q, at.table, next_state_of(transition))
+        target += rates.discount * best_value(next_values)
     return target - memory.q[at.table + pair]

@@ -43,7 +43,6 @@ from taichi_ants.engines.runs.step import (
     restore,
 )
 from taichi_ants.features import hooks_at
-from taichi_ants.learners import model
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import (
@@ -52,7 +51,6 @@ from taichi_ants.learners.memory import (
     Transition,
     error_function,
     read_rates,
-    update,
     values_of,
 )
 from taichi_ants.task.constants import N_ACTIONS, ROW, Event
@@ -65,12 +63,16 @@ from taichi_ants.task.rules.policy import (
     choose,
 )
 
-import os
-LANES = int(os.environ.get('NL','16'))  # of a task on a CPU, if there are as many runs
+LANES = 16  # of a task on a CPU, if there are as many runs
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
 # indices are not negative.
 _PLACES = 2**30 - 8
 THREADS_OF_BLOCK = 32  # which a GPU starts together
+
+
+def takes_lanes(learner: Learner) -> bool:
+    """Return whether a learner computes all errors of a step before the first update."""
+    return learner.td_error is not None and not learner.plans
 
 
 @cache
@@ -105,16 +107,13 @@ def run_kernel(
     learns = learner is not None
     on_policy = learns and learner.draws_next_action
     begins = learns and learner.begin is not None
-    # Learners without memory compute all errors of a step before the first update.
-    at_once = learns and learner.td_error is not None and not learner.plans
+    at_once = learns and takes_lanes(learner)
     hyperparameters = learner.hyperparameters if learns else Hyperparameters
     read = read_rates(hyperparameters)
     error_of = error_function(learner.td_error) if at_once else None
     columns = N_SETTINGS + len(fields(hyperparameters))
     # A single lane has branches, which are faster where a learned policy repeats actions.
     alone, deposit = n_lanes == 1, rules.deposit
-    remember, replay = (learner.parts if learns and not alone else None) or (None, None)
-    replays = replay is not None
     observe, executes = observe_function(rules, alone), hooks_at(rules.features)["execute"]
     draw, chance_of_draw = BY_VALUES.get(rules.choice, (None, None))
     by_one = alone or draw is not None  # whether ants choose one after the other
@@ -122,7 +121,7 @@ def run_kernel(
     table = n_states * ROW
     # A CPU distributes tasks one by one, as runs are uneven.
     block = THREADS_OF_BLOCK if has_guards(arguments) else 1
-    Lanes = _lanes_type(n_lanes)
+    empty_lanes = _lanes_type(n_lanes)
 
     @ti.func
     def ant_of(lanes: ti.template(), k):
@@ -200,11 +199,6 @@ def run_kernel(
             lanes.integers[k] = run * a.integers_by_8 * 8 & _PLACES
             lanes.discount[k] = ti.cast(a.settings[run * columns + DISCOUNT], ti.f32)
             restore(a, base, 0, 0, a.size - 1)
-            if ti.static(replays):
-                if lanes.run[k] < a.n_runs:
-                    for state in range(n_states):
-                        first = lanes.table[k] + state * ROW
-                        update(memory, first, a.q[first])
         if ti.static(not learns):
             lanes.random_state[k] = a.streams[run * a.n_episodes + lanes.episode[k]]
         if ti.static(begins):
@@ -227,9 +221,7 @@ def run_kernel(
     @ti.func
     def at_of(lanes: ti.template(), k):
         """Return the place of the run in lane k in the memory of learners."""
-        return At(
-            lanes.table[k] & _PLACES, lanes.floats[k] & _PLACES, lanes.integers[k] & _PLACES
-        )
+        return At(lanes.table[k] & _PLACES, lanes.floats[k] & _PLACES, lanes.integers[k] & _PLACES)
 
     @ti.func
     def record_choice(a: ti.template(), lanes: ti.template(), k, executed):
@@ -261,9 +253,7 @@ def run_kernel(
         ant, base, clock = ant_of(lanes, k), lanes.base[k], lanes.clock[k]
         if ti.static(deposit != NONE):  # no branch, because it could not be predicted
             laid = laid_behind(deposit, a, base, ant, clock)
-            a.cells[base + ant.cell] = ti.select(
-                lanes.lays[k] == 1, laid, a.cells[base + ant.cell]
-            )
+            a.cells[base + ant.cell] = ti.select(lanes.lays[k] == 1, laid, a.cells[base + ant.cell])
         if lanes.exchanges[k] != 0:
             seen, executed = lanes.paper_state[k], lanes.executed[k]
             keep(lanes, k, pick_up_or_give(deposit, a, base, ant, seen, executed, clock))
@@ -336,8 +326,6 @@ def run_kernel(
             if lanes.run[k] < a.n_runs:
                 if ti.static(at_once):
                     a.q[lanes.entry[k]] = lanes.updated[k]
-                elif ti.static(replays):
-                    remember(*(memory, at_of(lanes, k), taken_in(a, lanes, k), rates_of(a, lanes, k)))
                 elif ti.static(learns):
                     lanes.error[k], lanes.random_state[k] = learner.learn(
                         *(memory, at_of(lanes, k), taken_in(a, lanes, k)),
@@ -345,9 +333,6 @@ def run_kernel(
                     )
                 if ti.static(traced):
                     record_result(a, lanes, k)
-        if ti.static(replays):
-            for _ in range(rates_of(a, lanes, 0).planning_steps):
-                replay_all(a, memory, lanes)
         for k in range(n_lanes):
             lanes.total[k] += a.rewards[lanes.event[k]]
             lanes.state[k] = lanes.next_state[k]
@@ -358,22 +343,6 @@ def run_kernel(
             lanes.ended[k] = ti.cast(is_over & (lanes.run[k] < a.n_runs), ti.i32)
             ends += lanes.ended[k]
         return ends
-
-    @ti.func
-    def replay_all(a: ti.template(), memory: ti.template(), lanes: ti.template()):
-        """Update a pair from each model."""
-        for k in range(n_lanes):
-            rng = advance(lanes.random_state[k])
-            lanes.random_state[k] = rng
-            n_visited = model.visited(memory, at_of(lanes, k))
-            lanes.entry[k] = below(high_word(bits_of(rng)), n_visited)
-        for k in range(n_lanes):
-            lanes.entry[k], lanes.updated[k] = replay(
-                memory, at_of(lanes, k), rates_of(a, lanes, k), lanes.entry[k]
-            )
-        for k in range(n_lanes):
-            if lanes.run[k] < a.n_runs:
-                update(memory, lanes.entry[k], lanes.updated[k])
 
     @ti.func
     def rates_of(a: ti.template(), lanes: ti.template(), k):
@@ -417,18 +386,15 @@ def run_kernel(
         lanes.episode[k] = episode + 1
         if episode + 1 == a.n_episodes:
             a.random_states[run] = lanes.random_state[k]
-            if ti.static(replays):
-                for state in range(n_states):
-                    a.q[lanes.table[k] + state * ROW + N_ACTIONS] = 0.0
             lanes.run[k], lanes.episode[k] = ti.atomic_add(a.begun[0], 1), 0
             lanes.recorded[k] = lanes.run[k] * a.n_episodes * a.max_steps
 
     @ti.kernel
     def do_runs(a: arguments):
-        memory = ti.static(LearnerArrays(a.q, a.floats, a.integers, n_states, replays))
+        memory = ti.static(LearnerArrays(a.q, a.floats, a.integers, n_states))
         ti.loop_config(block_dim=block)
         for task in range(a.n_tasks):
-            lanes, ends, active = Lanes(), n_lanes, 1
+            lanes, ends, active = empty_lanes(), n_lanes, 1
             for k in range(n_lanes):
                 run = task + k * a.n_tasks
                 lanes.run[k], lanes.base[k] = run, run * (a.size + EXTRA_CELLS)
