@@ -323,7 +323,7 @@ def run_kernel(
                 )
                 lanes.updated[k] = value + rates.learning_rate * lanes.error[k]
         for k in range(n_lanes):
-            if lanes.run[k] < a.n_runs:
+            if ti.static(alone) or lanes.run[k] < a.n_runs:
                 if ti.static(at_once):
                     a.q[lanes.entry[k]] = lanes.updated[k]
                 elif ti.static(learns):
@@ -340,7 +340,9 @@ def run_kernel(
                 lanes.action[k] = lanes.next_action[k]
             lanes.step[k] += 1
             is_over = (lanes.event[k] == Event.DELIVERED) | (lanes.step[k] == a.max_steps)
-            lanes.ended[k] = ti.cast(is_over & (lanes.run[k] < a.n_runs), ti.i32)
+            if ti.static(not alone):
+                is_over &= lanes.run[k] < a.n_runs
+            lanes.ended[k] = ti.cast(is_over, ti.i32)
             ends += lanes.ended[k]
         return ends
 
