@@ -212,16 +212,16 @@ class Runs:
         """
         # Imported here, because Taichi must be configured first; see `runtime`.
         from taichi_ants.engines.launch import Launch, on_device
-        from taichi_ants.engines.runs.kernels import LANES, run_kernel, takes_lanes
+        from taichi_ants.engines.runs.kernels import LANES, run_kernel
         from taichi_ants.engines.runs.step import Rules
 
         task, state = self.task, self.state
         start_cells, headings = self.world.first_starts(words_of(self.seeds))
         settings = runtime.start()
-        # A few runs, and learners with memory, are faster one by one.
+        # A few runs are faster one by one, and so are those of learners with much memory.
         several = 2 * len(self) >= LANES * settings.threads and not traced
-        simple = self.learner is None or takes_lanes(self.learner)
-        lanes = LANES if several and simple and not runtime.compiles_for_gpu() else 1
+        several &= self.learner is None or self.learner.td_error is not None
+        lanes = LANES if several and not runtime.compiles_for_gpu() else 1
         launch = Launch(partial(run_kernel, Rules.of(task), self.learner, traced, lanes))
         falls = task.evaporation_in_training if self.learner else task.evaporation_in_evaluation
         common = {**laid_out([self.world], task, falls), "max_steps": self.max_steps}
@@ -238,7 +238,7 @@ class Runs:
             values = {
                 "n_runs": n,
                 "n_tasks": n_tasks,
-                "begun": np.full(1, n_tasks * lanes, np.int32),  # runs
+                "begun": np.full(1, n_tasks * lanes, np.int32),  # the next run that a lane takes
                 "n_episodes": episodes.stop - episodes.start,
                 "regrows": 0,  # food that grows back at once has no effect after a delivery
                 "start_cells": start_cells[runs],

@@ -27,6 +27,7 @@ from taichi_ants.engines.layout import (
     MIN_EPSILON,
     MIN_LEARNING_RATE,
     N_SETTINGS,
+    OUTCOMES,
     RETURNS,
     STEPS,
 )
@@ -56,23 +57,13 @@ from taichi_ants.learners.memory import (
 from taichi_ants.task.constants import N_ACTIONS, ROW, Event
 from taichi_ants.task.rules.actions import bit_number_in, step_end
 from taichi_ants.task.rules.pheromone import FADING, NONE
-from taichi_ants.task.rules.policy import (
-    BY_VALUES,
-    best_actions,
-    chance_of,
-    choose,
-)
+from taichi_ants.task.rules.policy import BY_VALUES, best_actions, chance_of, choose
 
 LANES = 16  # of a task on a CPU, if there are as many runs
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
 # indices are not negative.
 _PLACES = 2**30 - 8
 THREADS_OF_BLOCK = 32  # which a GPU starts together
-
-
-def takes_lanes(learner: Learner) -> bool:
-    """Return whether a learner computes all errors of a step before the first update."""
-    return learner.td_error is not None and not learner.plans
 
 
 @cache
@@ -83,8 +74,7 @@ def _lanes_type(n: int) -> Any:
         *("run", "episode", "step", "clock", "total", "ended", "base", "table", "recorded"),
         *("cell", "heading", "carries", "carried", "event", "paper_state", "state", "action"),
         *("executed", "lays", "exchanges", "first", "last", "entry", "floats", "integers"),
-        "settings",
-        *("explores", "choices", "n_choices"),
+        *("settings", "explores", "choices", "n_choices", "drawn"),
         *("next_state", "next_action", "terminated", "truncated"),
     )
     return ti.types.struct(
@@ -107,7 +97,8 @@ def run_kernel(
     learns = learner is not None
     on_policy = learns and learner.draws_next_action
     begins = learns and learner.begin is not None
-    at_once = learns and takes_lanes(learner)
+    # Such learners can compute all errors of a step before the first update.
+    at_once = learns and learner.td_error is not None and not learner.plans
     hyperparameters = learner.hyperparameters if learns else Hyperparameters
     read = read_rates(hyperparameters)
     error_of = error_function(learner.td_error) if at_once else None
@@ -117,6 +108,8 @@ def run_kernel(
     observe, executes = observe_function(rules, alone), hooks_at(rules.features)["execute"]
     draw, chance_of_draw = BY_VALUES.get(rules.choice, (None, None))
     by_one = alone or draw is not None  # whether ants choose one after the other
+    # Whether an episode in which no random number mattered is equal to all others of the run.
+    repeats = not (learns or by_one or executes or hooks_at(rules.features)["see"])
     n_states = rules.observation.n_states
     table = n_states * ROW
     # A CPU distributes tasks one by one, as runs are uneven.
@@ -179,6 +172,8 @@ def run_kernel(
             best = best_actions(values_of(a.q, lanes.table[k], states[k]))
             lanes.choices[k] = ti.select(lanes.explores[k] == 1, (1 << N_ACTIONS) - 1, best)
             lanes.n_choices[k] = popcnt(lanes.choices[k])
+            if ti.static(repeats):
+                lanes.drawn[k] |= ti.cast(lanes.n_choices[k] > 1, ti.i32)
         for k in range(n_lanes):
             lanes.n_choices[k] = below(lanes.word[k], lanes.n_choices[k])
         for k in range(n_lanes):
@@ -208,7 +203,7 @@ def run_kernel(
         lanes.epsilon[k] = ti.cast(a.epsilon[run], ti.f32)
         lanes.explore_below[k] = ti.cast(a.epsilon[run] * 4294967296.0, ti.u64)
         lanes.step[k], lanes.clock[k], lanes.total[k] = 0, 0, 0
-        lanes.first[k], lanes.last[k] = a.size, -1
+        lanes.first[k], lanes.last[k], lanes.drawn[k] = a.size, -1, 0
         ant = Ant(cell=a.start_cells[run], heading=a.start_headings[run])
         ant.random_state = lanes.random_state[k]
         lanes.paper_state[k], lanes.state[k], ant.random_state = observe(a, base, ant, 0)
@@ -256,7 +251,9 @@ def run_kernel(
             a.cells[base + ant.cell] = ti.select(lanes.lays[k] == 1, laid, a.cells[base + ant.cell])
         if lanes.exchanges[k] != 0:
             seen, executed = lanes.paper_state[k], lanes.executed[k]
-            keep(lanes, k, pick_up_or_give(deposit, a, base, ant, seen, executed, clock))
+            after = pick_up_or_give(deposit, a, base, ant, seen, executed, clock)
+            lanes.drawn[k] |= ti.cast(after.random_state != ant.random_state, ti.i32)
+            keep(lanes, k, after)
 
     @ti.func
     def act_and_observe(a: ti.template(), lanes: ti.template()):
@@ -386,7 +383,13 @@ def run_kernel(
             a.learning_rate[run] * a.settings[settings + LEARNING_RATE_DECAY],
         )
         lanes.episode[k] = episode + 1
-        if episode + 1 == a.n_episodes:
+        if ti.static(repeats):
+            if lanes.drawn[k] == 0:
+                for later in range(episode + 1, a.n_episodes):
+                    for kind in ti.static(range(len(OUTCOMES))):
+                        a.outcomes[kind, run, later] = a.outcomes[kind, run, episode]
+                lanes.episode[k] = a.n_episodes
+        if lanes.episode[k] == a.n_episodes:
             a.random_states[run] = lanes.random_state[k]
             lanes.run[k], lanes.episode[k] = ti.atomic_add(a.begun[0], 1), 0
             lanes.recorded[k] = lanes.run[k] * a.n_episodes * a.max_steps
