@@ -334,7 +334,8 @@ def run_kernel(
             lanes.total[k] += a.rewards[lanes.event[k]]
             lanes.state[k] = lanes.next_state[k]
             if ti.static(on_policy):
-                lanes.action[k] = lanes.next_action[k]
+                # An ant that has no run any more needs an action, too.
+                lanes.action[k] = ti.max(lanes.next_action[k], 0)
             lanes.step[k] += 1
             is_over = (lanes.event[k] == Event.DELIVERED) | (lanes.step[k] == a.max_steps)
             if ti.static(not alone):
