@@ -207,6 +207,7 @@ MUTATIONS = [
     ),
     ("engines/runs/kernels.py", "lanes.lays[k] == 1, laid", "lanes.lays[k] == 0, laid", RUNS),
     ("engines/runs/kernels.py", "ti.cast(lanes.n_choices[k] > 1, ti.i32)", "0", RUNS),
+    ("engines/runs/kernels.py", "ti.cast(lanes.explore_below[k] > 0, ti.i32)", "0", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
     ("features/life.py", "a.age >= lifespan", "a.age > lifespan", COLONY),
     ("engines/colony/life.py", "tick >= taken + waits", "tick > taken + waits", COLONY),

@@ -203,7 +203,8 @@ def run_kernel(
         lanes.epsilon[k] = ti.cast(a.epsilon[run], ti.f32)
         lanes.explore_below[k] = ti.cast(a.epsilon[run] * 4294967296.0, ti.u64)
         lanes.step[k], lanes.clock[k], lanes.total[k] = 0, 0, 0
-        lanes.first[k], lanes.last[k], lanes.drawn[k] = a.size, -1, 0
+        lanes.first[k], lanes.last[k] = a.size, -1
+        lanes.drawn[k] = ti.cast(lanes.explore_below[k] > 0, ti.i32)
         ant = Ant(cell=a.start_cells[run], heading=a.start_headings[run])
         ant.random_state = lanes.random_state[k]
         lanes.paper_state[k], lanes.state[k], ant.random_state = observe(a, base, ant, 0)

@@ -200,7 +200,8 @@ def test_many_runs_equal_single_ones(learner, observation, deposit, choice, nois
         config = random_config(number, learner)
         together = train(world, config, seeds, 5, 40, task)
         tables = np.random.default_rng(number).integers(0, 4, together.q_values[0].shape)
-        rolled = evaluate(world, tables, 4, seeds, 40, task)
+        epsilon = (0.0, 0.1)[number % 2]
+        rolled = evaluate(world, tables, 4, seeds, 40, task, epsilon)
         drawn += (rolled.returns != rolled.returns[:, :1]).any(axis=1).mean()
         for s in (0, 5, len(seeds) // 2, len(seeds) - 1):
             alone = train(world, config, seeds[s], 5, 40, task)
@@ -208,7 +209,7 @@ def test_many_runs_equal_single_ones(learner, observation, deposit, choice, nois
                 assert np.array_equal(getattr(together, name)[:, s], getattr(alone, name)[:, 0])
             for name, array in vars(alone.state).items():
                 assert np.array_equal(getattr(together.state, name)[0, s], array[0, 0]), name
-            once = evaluate(world, tables[s], 4, seeds[s], 40, task)
+            once = evaluate(world, tables[s], 4, seeds[s], 40, task, epsilon)
             for name in ("returns", "steps", "deliveries"):
                 assert np.array_equal(getattr(rolled, name)[s], getattr(once, name))
     assert 0 < drawn < 4  # with ties, rollouts of a table differ
