@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from measuring import Work, a_ratio, machine, pace, publish
-from throughput import ENGINE, compile_c, compiler, compiler_note
+from throughput import compile_c, compiler, compiler_note
 
 from taichi_ants import Task, TrainingConfig, runtime, worlds
 from taichi_ants.analysis.tables import Table, figure, interval, plain_text, thousands
@@ -30,7 +30,7 @@ from taichi_ants.errors import AntsError, count
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import foraging, queueing
 
-SOURCE = ENGINE / "colony.c"
+SOURCE = Path(__file__).with_name("colony_episode.c")  # it includes colony.c of the lab
 TASKS = {"the paper's": Task(), "foraging": foraging(), "queueing": queueing()}
 Q_LEARNING = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.97)
 _SECONDS = 0.3  # the shortest measurement

@@ -1,27 +1,33 @@
-"""Compare the speed of vector environments with that of the engine of `taichi_ants.train`.
+"""Compare the speed of environments with that of the engine of `taichi_ants.train`, and CartPole.
 
-All ants act at random in the paper's world. "1 step" is one environment of `gymnasium.make`, and
-"CartPole" one of Gymnasium's own. `step` and `rollout` get actions that were drawn before. "policy"
-is a rollout that draws them itself, as the engine does, with epsilon 1. Rollouts have up to two
-million steps of all environments. The command measures all in turn, several times. The table
-contains medians: steps per second by the wall clock, and processor time per step of all threads
-together. Ratios are those of the engine's processor time, which other programs hardly change, and
-of its wall-clock time.
+All ants act at random in the paper's world. The first table has single environments, as
+`gymnasium.make` returns them: ours; CartPole, one of Gymnasium's own; and what no environment that
+launches a compiled kernel can avoid, the launch of an empty kernel with one array and Gymnasium's
+wrappers. The second has vector environments. `step` and `rollout` get actions that were drawn
+before. "policy" is a rollout that draws them itself, as the engine does, with epsilon 1. Rollouts
+have up to two million steps of all environments. The command measures all in turn, several times.
+Ratios are medians of those within a round, by the processor time of all threads together, which
+other programs hardly change; above 1, a row is faster.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import gymnasium
 import numpy as np
+from measuring import machine, publish
 
 from taichi_ants import evaluate, runtime, worlds
+from taichi_ants.analysis.tables import Table, figure, interval, plain_text
+from taichi_ants.errors import count
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.studies.command_line import Parser, run_command, whole_number
 
 ID = "taichi_ants/HexForage-v0"
+CARTPOLE, ENGINE = "CartPole", "the engine"
 _STEPS = 6_000_000  # of all ants in a measurement, roughly
 _STEPS_OF_ROLLOUT = 1 << 21  # of all environments
 _MOST_LENGTH = 1024
@@ -71,6 +77,37 @@ def vector(num_envs: int) -> dict[str, Callable[[], int]]:
     return {f"{num_envs} {one.__name__}": one for one in (step, rollout, policy)}
 
 
+class Nothing(gymnasium.Env):  # type: ignore[type-arg]
+    """An environment whose steps launch an empty kernel with one array, and nothing else."""
+
+    observation_space, action_space = gymnasium.spaces.Discrete(1), gymnasium.spaces.Discrete(1)
+
+    def __init__(self) -> None:
+        from taichi_ants.engines.launch import Launch
+
+        self.launch, self.values = Launch(empty_kernel), {"array": np.zeros(1, np.int32)}
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        """Return an observation and info."""
+        return 0, {}
+
+    def step(self, action: Any) -> Any:
+        """Launch the kernel."""
+        self.launch.repeat(self.values)
+        return 0, 0.0, False, False, {}
+
+
+def empty_kernel(arguments: Any) -> Any:
+    """Return a kernel that does nothing."""
+    import taichi as ti
+
+    def nothing(a):  # type: ignore[no-untyped-def]
+        pass
+
+    nothing.__annotations__ = {"a": arguments}
+    return ti.kernel(nothing)
+
+
 def single(name: str) -> Callable[[], int]:
     """Return a function that steps one environment, with all wrappers of `gymnasium.make`."""
     env = gymnasium.make(name)
@@ -87,39 +124,52 @@ def single(name: str) -> Callable[[], int]:
     return step
 
 
-def measure(num_envs: list[int], rounds: int, threads: int | None) -> None:
-    """Print a line for the engine, and for each way to step each number of environments."""
-    runtime.start(threads)
+def table(title: str, measured: dict[str, list[Measured]], first: str, notes: list[str]) -> Table:
+    """Return a table of medians, and of the ratio of processor time to that of a first row."""
+    rows, costs_of = [], {k: np.array([c / n for n, _, c in v]) for k, v in measured.items()}
+    for name, given in measured.items():
+        paces, costs = np.array([n / wall for n, wall, _ in given]), costs_of[name]
+        ratios = costs_of[first] / costs
+        spread = interval(ratios.min(), ratios.max(), 2)
+        shown = [figure(float(np.median(one))) for one in (paces / 1e3, costs * 1e9, ratios)]
+        rows.append([name, *shown, spread])
+    columns = ["one step of", "1000 steps/s", "CPU ns", f"to {first}", "lowest, highest"]
+    return Table(title, columns, rows, notes, text_columns=1)
+
+
+def measure(num_envs: list[int], rounds: int, threads: int | None, publishes: bool) -> None:
+    """Print the tables."""
+    threads = runtime.start(threads).threads
     import taichi_ants.envs  # noqa: F401 (registers)
 
-    subjects: dict[str, Callable[[], int]] = {
-        "engine": engine,
-        "1 step": single(ID),
-        "CartPole": single("CartPole-v1"),
+    gymnasium.register("Nothing-v0", entry_point=Nothing)
+    singles = {
+        "HexForage": single(ID),
+        CARTPOLE: single("CartPole-v1"),
+        "an empty launch": single("Nothing-v0"),
     }
+    several: dict[str, Callable[[], int]] = {ENGINE: engine}
     for n in num_envs:
-        subjects |= vector(n) if n > 1 else {}
+        several |= vector(n)
+    subjects = {**singles, **several}
     for subject in subjects.values():
         subject()
     measured: dict[str, list[Measured]] = {name: [] for name in subjects}
     for _ in range(rounds):
         for name, subject in subjects.items():
             measured[name].append(timed(subject))
-    print(
-        f"{'':>14}{'M steps/s':>11}{'lowest':>9}{'highest':>9}{'of engine':>11}"
-        f"{'CPU ns':>9}{'of engine':>11}"
-    )
-    paces = {name: [n / wall / 1e6 for n, wall, _ in given] for name, given in measured.items()}
-    costs = {
-        name: float(np.median([cpu / n * 1e9 for n, _, cpu in given]))
-        for name, given in measured.items()
-    }
-    for name, values in paces.items():
-        share = float(np.median(values) / np.median(paces["engine"]))
-        print(
-            f"{name:>14}{np.median(values):11.3f}{min(values):9.3f}{max(values):9.3f}"
-            f"{share:11.3f}{costs[name]:9.1f}{costs['engine'] / costs[name]:11.3f}"
+    medians = f"Medians of {count(rounds, 'round')}, with {count(threads, 'thread')}."
+    notes = [f"{medians} {machine(('taichi', 'numpy', 'gymnasium'))}"]
+    made = [
+        table(title, {name: measured[name] for name in some}, first, lines)
+        for title, some, first, lines in (
+            ("A single environment", singles, CARTPOLE, []),
+            ("Vector environments", several, ENGINE, notes),
         )
+    ]
+    print(plain_text(made, 120), end="")
+    if publishes:
+        publish("performance_environments", made)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -136,7 +186,13 @@ def main(arguments: list[str] | None = None) -> None:
     )
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="use N threads (default: all)")
-    run_command(lambda: measure(**vars(parser.parse_args(arguments))))
+    add("--publish", action="store_true", help="write the tables to docs/results/performance.md")
+
+    def command() -> None:
+        given = parser.parse_args(arguments)
+        measure(given.num_envs, given.rounds, given.threads, given.publish)
+
+    run_command(command)
 
 
 if __name__ == "__main__":

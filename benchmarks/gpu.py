@@ -1,9 +1,10 @@
 """Compare the results of a GPU with those of a CPU, and measure its speed.
 
 Results are those of trainings, environments and colonies with each feature of the model. Those of
-trainings and colonies have hashes recorded on a CPU, in tests/golden. Speeds are those of a second
-call, by the wall clock. The most telling parts come first; after `--seconds`, the command leaves
-out the others, and says so. It prints each line when it has it, then tables.
+trainings and colonies have hashes recorded on a CPU, in tests/golden. They are compared in several
+processes, because kernels take long to compile; after `--seconds`, the command leaves out those
+that have not ended, and says so. Speeds are those of a second call, by the wall clock. It prints
+each line when it has it, then tables.
 
 Without a GPU, `--on-cpu` compares the results of kernels for a GPU, which run on the CPU.
 """
@@ -15,7 +16,9 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, wait
 from functools import partial
+from multiprocessing import get_context
 
 import numpy as np
 from cores import COLONIES, Q_LEARNING, colony_of
@@ -23,7 +26,7 @@ from measuring import ROOT, a_ratio, machine, pace, publish
 
 from taichi_ants import AntsError, Task, runtime, train, worlds
 from taichi_ants.analysis.tables import Table, figure, plain_text
-from taichi_ants.envs.forage import HexForageVectorEnv
+from taichi_ants.envs.forage import HexForageVectorEnv, Rollout
 from taichi_ants.studies.command_line import Parser, run_command
 
 os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "1")  # `record` would choose 0, to compile faster
@@ -101,33 +104,44 @@ def speed_of_training(threads_of_block: int) -> float:
     return float(done.steps.sum(dtype=np.int64) / done.seconds / 1e6)
 
 
-def speed_of_environments(rolls: bool) -> float:
+def speed_of_environments(act: Callable[[HexForageVectorEnv, int], object], length: int) -> float:
     """Return million steps/s of environments with random actions."""
     env = HexForageVectorEnv(MANY, observation_format="index")
     env.reset(seed=0)
-    length = 64 if rolls else 1
-    actions = np.random.default_rng(0).integers(5, size=MANY)
-    act = (
-        partial(env.rollout, "random", length, epsilon=1.0) if rolls else partial(env.step, actions)
-    )
 
     def steps() -> int:
-        act()
+        act(env, length)
         return length * MANY
 
     steps()
     return pace(steps, 2.0)[0] / 1e6
 
 
+def roll(env: HexForageVectorEnv, length: int) -> Rollout:
+    """Take steps at random; the results stay on the GPU."""
+    return env.rollout("random", length, epsilon=1.0)
+
+
+def roll_and_read(env: HexForageVectorEnv, length: int) -> object:
+    """Take steps at random, and read all results."""
+    return [*roll(env, length)]
+
+
+def step(env: HexForageVectorEnv, length: int) -> None:
+    """Take one step at random."""
+    env.step(env.np_random.integers(5, size=MANY))
+
+
 # Their goals, or None.
 SPEEDS: dict[str, tuple[float | None, Callable[[], float]]] = {
     "colony, 1 000 000 ants": (1500, partial(speed_of_colony, *COLONIES[0])),
     "`train`, 65 536 runs": (3000, partial(speed_of_training, 32)),
-    "`rollout`, 65 536 environments": (2000, partial(speed_of_environments, True)),
+    "`rollout`, 65 536 environments": (2000, partial(speed_of_environments, roll, 256)),
+    "`rollout`, and all results read": (None, partial(speed_of_environments, roll_and_read, 256)),
     "colony, 100 000 ants": (400, partial(speed_of_colony, *COLONIES[1])),
     "colony, 4 096 worlds of 64 ants": (1000, partial(speed_of_colony, *COLONIES[3])),
     "colony, 10 000 ants": (None, partial(speed_of_colony, *COLONIES[2])),
-    "`step`, 65 536 environments": (None, partial(speed_of_environments, False)),
+    "`step`, 65 536 environments": (None, partial(speed_of_environments, step, 1)),
     "`train`, blocks of 1 thread": (None, partial(speed_of_training, 1)),
     "`train`, blocks of 128 threads": (None, partial(speed_of_training, 128)),
 }
@@ -142,50 +156,78 @@ def cases(expected: str) -> dict[str, Callable[[], Iterator[str]]]:
     }
 
 
-def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
-    """Return a table of results that are equal or not, and one of speeds."""
-    began, rows = time.perf_counter(), dict[str, list[str]]()
-    expected = environments() if word in "environments" else ""
-    name, bandwidth, measures = "Without a GPU, on a CPU", 0.0, {} if on_cpu else SPEEDS
+def start(on_cpu: bool) -> None:
+    """Start Taichi for kernels for a GPU."""
     if on_cpu:
         runtime.gpu_kernels_on_cpu = True
     else:
-        name, bandwidth = card()
-        name += f", {figure(bandwidth / 1e12)} TB/s"
         runtime.start(arch="cuda")
-    compared = {case: one for case, one in cases(expected).items() if word in case}
-    first = [case for case in ("training: q_learning", "colony: plain") if case in compared]
-    for case in (*first, *measures, *(case for case in compared if case not in first)):
+
+
+def compared(case: str, expected: str) -> str:
+    """Return whether the results of a case have the hash of a CPU."""
+    try:
+        ours, theirs = cases(expected)[case]()
+    except Exception as error:  # the others are worth the time on a GPU
+        return f"FAILED: {error}"
+    return "equal" if ours == theirs else "DIFFERENT"
+
+
+def comparisons(seconds: float, on_cpu: bool, word: str) -> Iterator[list[str]]:
+    """Yield the name of each case that contains a word, and its result, when it has ended."""
+    expected = environments() if word in "environments" else ""
+    chosen = [case for case in cases(expected) if word in case]
+    workers = min(runtime.available_threads(), len(chosen)) or 1
+    end = time.perf_counter() + seconds
+    with ProcessPoolExecutor(workers, get_context("spawn"), start, (on_cpu,)) as pool:
+        results = {case: pool.submit(compared, case, expected) for case in chosen}
+        for case, result in results.items():
+            done, _ = wait([result], max(0.0, end - time.perf_counter()))
+            yield [case, result.result() if done else "left out"]
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def speeds(bandwidth: float) -> Iterator[list[str]]:
+    """Yield the name of each measure, million steps/s, the goal for this GPU, and the share."""
+    start(on_cpu=False)
+    for name, (goal, measure) in SPEEDS.items():
         try:
-            if time.perf_counter() - began > seconds:
-                rows[case] = [case, "left out"]
-            elif case in measures:
-                goal, measure = measures[case]
-                rows[case] = [case, figure(found := measure()), "", ""]
-                if goal and bandwidth:
-                    goal *= bandwidth / _H200
-                    rows[case][2:] = figure(goal), figure(found / goal)
-            else:
-                ours, theirs = compared[case]()
-                rows[case] = [case, "equal" if ours == theirs else "DIFFERENT"]
-        except Exception as error:  # the others are worth the time on a GPU
-            rows[case] = [case, f"FAILED: {error}"]
-        print(*rows[case], sep="  ", flush=True)
-    paces = [row for case, row in rows.items() if case in measures]
-    results = [summary(kind, rows) for kind in ("environments", "training", "colony")]
-    about, columns = (
-        f"{name}: {machine(('taichi', 'numpy'))}",
-        ["", "cases", "equal to a CPU's", "others"],
-    )
+            found = measure()
+        except Exception as error:
+            yield [name, f"FAILED: {error}", "", ""]
+            continue
+        wanted = goal and goal * bandwidth / _H200
+        yield [
+            name,
+            figure(found),
+            *((figure(wanted), figure(found / wanted)) if wanted else ("", "")),
+        ]
+
+
+def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
+    """Return a table of results that are equal or not, and one of speeds."""
+    name, bandwidth = ("Without a GPU, on a CPU", 0.0) if on_cpu else card()
+    rows, paces = [], []
+    for row in comparisons(seconds, on_cpu, word):
+        print(*row, sep="  ", flush=True)
+        rows.append(row)
+    if not on_cpu:
+        name += f", {figure(bandwidth / 1e12)} TB/s"
+        for row in speeds(bandwidth):
+            print(*row, sep="  ", flush=True)
+            paces.append(row)
+    results = [summary(kind, dict(rows)) for kind in ("environments", "training", "colony")]
+    about = f"{name}: {machine(('taichi', 'numpy'))}"
+    columns = ["", "cases", "equal to a CPU's", "others"]
     made = [Table("Results of kernels for a GPU", columns, results, [about])]
     if paces:
         made.insert(0, Table("Speed", ["M steps/s", "measured", "goal", "share of it"], paces))
     return made
 
 
-def summary(kind: str, rows: dict[str, list[str]]) -> list[str]:
+def summary(kind: str, results: dict[str, str]) -> list[str]:
     """Return the row of all cases of a kind: how many are equal, and the others."""
-    found = {case: row[1] for case, row in rows.items() if case.startswith(kind)}
+    found = {case: result for case, result in results.items() if case.startswith(kind)}
     others = [f"{case}: {result}" for case, result in found.items() if result != "equal"]
     return [kind, str(len(found)), str(len(found) - len(others)), "; ".join(others)]
 
@@ -194,7 +236,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    add("--seconds", type=a_ratio, default=200.0, help="begin no part later")
+    add("--seconds", type=a_ratio, default=200.0, help="compare no longer")
     add("--only", metavar="WORD", default="", help="compare results whose name has this word")
     add("--on-cpu", action="store_true", help="run kernels for a GPU on the CPU")
     add("--publish", action="store_true", help="write the tables to docs/results/performance.md")

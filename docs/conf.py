@@ -41,6 +41,7 @@ extensions = [
 exclude_patterns = ["lessons/class"]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 default_role = "py:obj"
+highlight_language = "none"  # commands and what they print; Python blocks name their language
 
 # Pages. Notebooks hold their results, so that building the site runs nothing.
 nb_execution_mode = "off"
@@ -77,16 +78,33 @@ autodoc_member_order = "bysource"
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+napoleon_attr_annotations = False  # descriptions name types, and shapes too
+
+
+def split_attributes(app: Any, what: str, name: str, value: Any, options: Any, lines: Any) -> None:
+    """Give attributes that share a description an entry each; Napoleon does this for arguments."""
+    text = "\n".join(lines)
+    shared = re.compile(r"^    (\w+(?:, \w+)+): (.*\n(?:     .*\n)*)", re.MULTILINE)
+    start = text.find("Attributes:\n")
+    if start >= 0:
+        attributes = shared.sub(
+            lambda m: "".join(f"    {one}: {m[2]}" for one in m[1].split(", ")), text[start:] + "\n"
+        )
+        lines[:] = (text[:start] + attributes).split("\n")
+
+
+def keep_anchors(app: Any, page: str, source: list[str]) -> None:
+    """Let links to places in the lab keep their ends, `#home`, which MyST drops without `path:`."""
+    source[0] = re.sub(rf"\]\((?=[./]*(?:{'|'.join(APPS)})[#?])", "](path:", source[0])
 
 
 def link_apps(app: Any, doctree: nodes.document) -> None:
     """Make links to the lab and the article links, not downloads."""
     up = "../" * app.env.docname.count("/")
     for node in list(doctree.findall(download_reference)):
-        path, _, anchor = node["reftarget"].partition("#")
-        if Path(path).name in APPS:
-            uri = up + Path(path).name + (f"#{anchor}" if anchor else "")
-            node.replace_self(nodes.reference("", "", *node.children, refuri=uri))
+        name = Path(node["reftarget"]).name
+        if re.split("[#?]", name)[0] in APPS:
+            node.replace_self(nodes.reference("", "", *node.children, refuri=up + name))
 
 
 def mend_page(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
@@ -142,6 +160,8 @@ def copy_notebooks(app: Any, error: Exception | None) -> None:
 
 
 def setup(app: Any) -> None:
+    app.connect("autodoc-process-docstring", split_attributes, priority=400)  # before Napoleon
+    app.connect("source-read", keep_anchors)
     app.connect("doctree-read", link_apps, priority=100)
     app.connect("html-page-context", mend_page, priority=900)  # after the theme
     app.connect("builder-inited", draw_card)

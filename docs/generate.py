@@ -12,6 +12,8 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields, is_dataclass
+from functools import cached_property
 from importlib import import_module
 from inspect import isclass, isfunction, ismodule
 from pathlib import Path
@@ -20,13 +22,19 @@ from unittest import mock
 
 DOCS = Path(__file__).parent
 REFERENCE = DOCS / "reference"
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent), str(DOCS.parent / "experiments")]
+
+import columns  # noqa: E402
 
 import taichi_ants  # noqa: E402
 from taichi_ants import envs, learners, measures, rules, task, worlds  # noqa: E402, F401
 from taichi_ants.commands import COMMANDS  # noqa: E402
+from taichi_ants.measures.finished import FINISHED  # noqa: E402
+from taichi_ants.protocol import EVENTS  # noqa: E402
 from taichi_ants.settings import Named, declared  # noqa: E402
 from taichi_ants.studies import command_line  # noqa: E402
+from taichi_ants.studies.columns import NAMES, SWEEP  # noqa: E402
+from taichi_ants.studies.sweep_file import KEYS, KINDS, WORLD_KEYS  # noqa: E402
 from taichi_ants.task import observations  # noqa: E402
 
 
@@ -88,16 +96,7 @@ def listed(registry: str) -> str:
             ),
         )  # fmt: skip
     if registry == "learners":
-        kinds = [learners.get(name) for name in learners.names()]
-        return table(
-            ("Name", "What it is", "Hyperparameters", "Can share a table"),
-            (
-                [f"`{one.name}`", one.summary,
-                 ", ".join(f"`{s.name}`" for s in declared(one.hyperparameters)) or "none",
-                 "yes" if one.td_error else "no"]
-                for one in kinds
-            ),
-        )  # fmt: skip
+        return all_learners()
     return table(
         ("Name", "Reads", "Unit", "Meaning"),
         (
@@ -106,6 +105,64 @@ def listed(registry: str) -> str:
             for one in measures.BUILT_IN.values()
         ),
     )  # fmt: skip
+
+
+def all_learners() -> str:
+    """Return what learners declare, then the update of each, as its module describes it."""
+    rows, updates = [], []
+    for name in learners.names():
+        one = learners.get(name)
+        memory = one.memory(one.hyperparameters(), 128)
+        tables = {1: "1 table"}.get(n := memory.tables + 1, f"{n} tables")
+        numbers = memory.floats + memory.integers
+        own = [f"`{setting.name}`" for setting in declared(one.hyperparameters)]
+        stored = tables + (f", {numbers} numbers" if numbers else "")
+        yes_or_no = ["yes" if is_so else "no" for is_so in (one.draws_next_action, one.td_error)]
+        rows.append([f"[`{name}`](#{name})", ", ".join(own) or "none", stored, *yes_or_no])
+        about = import_module(f"taichi_ants.learners.{name}").__doc__ or ""
+        updates.append(f"### `{name}`\n\n{about.strip()}")
+    heads = (
+        "Hyperparameters",
+        "Memory for 128 states",
+        "Draws the next action",
+        "Can share a table",
+    )
+    return "\n\n".join([table(("Learner", *heads), rows), *updates])
+
+
+def measures_of(kind: str) -> str:
+    """Return the measures of finished runs of a kind."""
+    rows = ([f"`{one.name}`", one.unit, one.summary] for one in FINISHED[kind].values())
+    return table(("Measure", "Unit", "Meaning"), rows)
+
+
+def tables(command: str) -> str:
+    """Return the tables that a command writes, with all their columns."""
+    if command == "names":
+        rows = ([f"`{name}`", meaning] for name, (_, meaning) in NAMES.items())
+        return table(("In a name", "Stands for"), rows)
+    every = SWEEP if command == "sweep" else getattr(columns, command.upper())
+    return "\n\n".join(
+        f"### `{name}` of `{command}`\n\nIt has a row for each {one.row}.\n\n"
+        + table(("Column", "Meaning"), ([f"`{c}`", about] for c, about in one.columns.items()))
+        for name, one in every.items()
+    )
+
+
+def sweep_keys(part: str) -> str:
+    """Return the keys of sweep files: "file", "world", "events", or those of a kind of point."""
+    if part == "events":
+        rows = [[f"`[[{name}]]`", kind.__doc__.split("\n\n")[0]] for name, kind in EVENTS.items()]
+    elif part in KINDS:
+        own = [one for one in declared(KINDS[part]) if one.name not in KEYS]
+        rows = [[f"`{one.name}`", *one.in_words] for one in own]
+        return table(("Key", "Values", "Default", "Meaning"), rows).replace("'", '"')
+    else:
+        rows = [
+            [f"`{name}`", about]
+            for name, about in {"file": KEYS, "world": WORLD_KEYS}[part].items()
+        ]
+    return table(("Key", "Meaning"), rows).replace("`'", '`"').replace("'`", '"`')
 
 
 def inputs(kind: str) -> str:
@@ -194,7 +251,10 @@ MAKERS: dict[str, Callable[[str], str]] = {
     "list": listed,
     "inputs": inputs,
     "commands": commands,
+    "measures": measures_of,
     "spaces": spaces,
+    "sweep": sweep_keys,
+    "tables": tables,
 }
 _BLOCK = re.compile(r"(<!-- generated: (\w+) (\S+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -235,12 +295,87 @@ def public_names(module: Any) -> list[str]:
     return [n for n in names if not n.startswith("_") and not ismodule(getattr(module, n))]
 
 
+# Members of public classes that only the package uses: pages leave them out, and they may change.
+INTERNAL = {
+    "Caste": "pheromones_laid",
+    "Choice": "needs_table own_rule weights",
+    "ColonyEpisodes": "measured of_world",
+    "Every": "check",
+    "Field": "counts_without_food numbers",
+    "Interventions": "set_task state stream",
+    "Intervention": "check check_in",
+    "Learner": "memory_for settings",
+    "Measure": "check_state computed label uses_iqm",
+    "Move": "check",
+    "Observation": "ahead",
+    "Parameters": "entry_named",
+    "Pheromone": "darkest decay fades_after lasting numbers own_deposit own_evaporation share",
+    "Place": "check check_in",
+    "ProtocolEvent": "check times",
+    "ReferenceColony": "add castes fill new_ant observe table_of",
+    "Rewards": "by_event largest",
+    "Rollouts": "measured",
+    "Rule": "result",
+    "Run": "of_colony of_lone_ant",
+    "SetLearningRate": "check_in",
+    "SetTask": "as_dict changed check check_in converted",
+    "SetTrail": "check_in",
+    "Setting": "replace",
+    "TickingColony": "reset_worlds",
+    "ColonyState": "nbytes next_actions streams tables_of_ants",
+    "Recording": "to_bytes",
+    "Dataset": "described facts",
+    "Settings": "check converted entry_named named uses",
+    "ShorthandSettings": "as_dict converted facts from_dict replace",
+    "Snapshot": "ordered",
+    "Task": "all_cues ants_change check cues_of food_changes needs_table number_of numbers sees"
+    " own_reward own_rules pheromones_while uses",
+    "Threshold": "converted exists",
+    "Tidy": "columns measured",
+    "Traffic": "shared",
+    "TrainingConfig": "least_learning_rate next_epsilon next_learning_rate",
+    "TrainingResult": "measured",
+    "When": "check",
+    "World": "closer first_starts nests_of uses",
+    "_OfAnts": "check",
+}
+
+
+_MEMBERS = (classmethod, staticmethod, property, cached_property)
+
+
+def public_members(kind: Any) -> dict[str, Any]:
+    """Return the methods and properties of a class that its page describes, by name."""
+    if not isclass(kind):
+        return {}
+    hidden = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
+    hidden |= {*getattr(kind, "_fields", ())}
+    found: dict[str, Any] = {}
+    for base in kind.__mro__:
+        if not base.__module__.startswith("taichi_ants."):
+            continue
+        hidden |= {*INTERNAL.get(base.__name__, "").split()} - found.keys()
+        for name, value in vars(base).items():
+            # The docstring of the class describes properties that have none of their own.
+            is_member = callable(value) or (isinstance(value, _MEMBERS) and value.__doc__)
+            if is_member and name[0] != "_" and name not in hidden:
+                found.setdefault(name, value)
+    return found
+
+
 # Data of the package, whose values have no docstrings.
 DATA = {
+    "At": "The start of the memory of a run: the offsets `table`, `floats` and `integers`, i32.",
+    "BEHAVIOURS": "The behaviours of `classify` in words; a behaviour is an index.",
     "BUILT_IN": "The measures of the package by name, see [measures](../measures.md).",
+    "CELL_LETTERS": "The letters of codes, of an ant without food and of one with food.",
     "KINDS": "The kinds of rules by name, with their results and [inputs](../rule_inputs.md).",
     "LEARNERS": "The learners of the reference by name, in plain Python.",
     "OBSERVATIONS": "The observations of the reference by name, in plain Python.",
+    "REACHABLE_STATES": "The 100 indices of states that can occur under the rules, ascending.",
+    "TASK_NAMES": "The words for the load of an ant without food and of one with food.",
+    "Transition": "A step of an ant: `state`, `action`, `next_state`, `next_action` (-1 if none was"
+    " drawn), `terminated` and `truncated`, i32, and `reward`, f32.",
     "PAUSE": "Seconds for which an animation shows its last picture.",
 }
 
@@ -255,13 +390,14 @@ def api(module: str, seen: dict[int, str]) -> str:
     here, elsewhere, data = [], [], []
     for public in sorted(public_names(found), key=str.lower):
         value = getattr(found, public)
-        if public in DATA:
+        if public in DATA and not isclass(value):
             data.append(f"`{public}`\n: {DATA[public]}\n")
         elif id(value) in seen:
             elsewhere.append(f"{{py:obj}}`{seen[id(value)]}`")
         else:
             seen[id(value)] = f"{name}.{public}"
-            more = ["   :members:"] if isclass(value) else []
+            members = ", ".join(public_members(value))
+            more = [f"   :members: {members}"] if members else []
             here += [f".. auto{'class' if isclass(value) else 'function'}:: {public}", *more, ""]
     lines = [f"# {name}", "", (found.__doc__ or "").strip().replace("::\n", ":\n"), ""]
     if elsewhere:

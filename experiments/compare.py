@@ -113,7 +113,7 @@ def plan(options: Mapping[str, Any]) -> Plan:
     given = nested({path: value for path, value in options.items() if "." in path})
     of_world = given.get("world", {})
     if "seed" in of_world:
-        worlds.check_seed_counts(options["world"])
+        worlds.registry.check_seed_counts(options["world"])
     world = worlds.build(options["world"], **of_world)
     deliveries = DELIVERIES if options["delivery"] == "both" else (options["delivery"],)
     tasks = [Task().replace(delivery=delivery, **given.get("task", {})) for delivery in deliveries]

@@ -21,9 +21,10 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, OTHER, classify
     from taichi_ants.commands import render
     from taichi_ants.errors import count
-    from taichi_ants.rendering import Episode, check_animation, colours, text
+    from taichi_ants.rendering import Episode, colours, text
     from taichi_ants.rendering.rasteriser import Rasteriser, cell, draw_marks
     from taichi_ants.rendering.scene import check_size
+    from taichi_ants.rendering.writers import check_animation
     from taichi_ants.studies.command_line import Parser, given_world, run_command, whole_number
     from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import Rewards, Task
@@ -235,7 +236,7 @@ def show(settings: argparse.Namespace) -> None:
     load_plugin(settings.plugin)
     seed, checkpoints = noted_checkpoints(settings, given_world(settings))
     ant = "an ant" if settings.seed is not None else f"the median of {count(settings.seeds, 'ant')}"
-    learner = learners.label(render.training_config(settings).learner)
+    learner = learners.registry.label(render.training_config(settings).learner)
     title = settings.title or f"{learner}: {ant} before and after learning"
     longest = max(len(checkpoint.episode) for checkpoint in checkpoints)
     render.save_frames(settings, learning_frames(checkpoints, settings.size, title), longest)

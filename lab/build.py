@@ -25,32 +25,24 @@ DOCS = LAB.parent / "docs"
 
 
 class Page(NamedTuple):
-    """A page: its markup, styles and modules, the variables of its binaries, and its limit.
-
-    Each module uses only those before it while it is loaded.
-    """
+    """A page: its markup, styles and modules. Each module uses only those before it at first."""
 
     markup: str
     styles: tuple[str, ...]
     modules: tuple[str, ...]
-    binaries: dict[str, str]
-    most_bytes: int
 
 
 _ENGINE = ("worlds", "engine", "link")
 _SHARED = (*_ENGINE, "geometry", "looks", "run", "story", "shapes", "draw")
 _LAB = (
-    *("plot", "mind", "scenes", "daily", "brush", "controls", "train", "address", "film"),
-    *("embed", "main"),
+    *("plot", "mind", "scenes", "daily", "brush", "controls", "figures", "train", "address"),
+    *("film", "embed", "main"),
 )
-_COLONY = {"COLONY_WASM": "colony.wasm"}
 PAGES = {
     "lab.html": Page(
         "page/page.html",
         ("page/base.css", "page/style.css"),
         tuple(f"page/{name}.js" for name in (*_SHARED, *_LAB)),
-        {**_COLONY, "ANT_WASM": "ant.wasm"},
-        400_000,
     ),
     "article.html": Page(
         "article/article.html",
@@ -59,22 +51,20 @@ PAGES = {
             *(f"page/{name}.js" for name in (*_SHARED, "scenes")),
             *(f"article/{name}.js" for name in ("pieces", "world", "article")),
         ),
-        _COLONY,
-        500_000,
     ),
     "lessons.html": Page(
         "lessons/lessons.html",
         ("page/base.css", "article/article.css", "lessons/lessons.css"),
         (
-            *(f"page/{name}.js" for name in (*_SHARED, "mind", "scenes")),
+            *(f"page/{name}.js" for name in (*_SHARED, "mind", "scenes", "figures")),
             *(f"article/{name}.js" for name in ("pieces", "world")),
             *("../docs/lessons/page/random.js", "../docs/lessons/page/room.js"),
             *("../docs/lessons/page/experiments.js", "lessons/lessons.js"),
         ),
-        {**_COLONY, "ANT_WASM": "ant.wasm"},
-        400_000,
     ),
 }
+BINARIES = {"COLONY_WASM": "colony.wasm", "ANT_WASM": "ant.wasm"}
+MOST_BYTES = 400_000  # that a visitor should wait for
 FONTS = LAB / "page" / "fonts"
 FACES = (("Newsreader", "500", "newsreader.woff2"), ("Inter", "400 650", "inter.woff2"))
 _IMPORT = re.compile(r"^import\b[^;]*;\n", re.M)
@@ -113,20 +103,23 @@ def page(name: str) -> str:
         f'src: url(data:font/woff2;base64,{base64_of(FONTS / file)}) format("woff2"); }}\n'
         for family, weight, file in FACES
     )
-    binaries = {key: base64_of(LAB / "engine" / file) for key, file in one.binaries.items()}
+    code = script(one.modules)
+    found = {key: base64_of(LAB / "engine" / BINARIES[key]) for key in BINARIES if key in code}
+    head, body = (LAB / one.markup).read_text("utf-8").split("<body>\n")
     parts = {
+        "HEAD": head,
+        "BODY": body,
         "STYLE": faces + "\n".join((LAB / style).read_text("utf-8") for style in one.styles),
-        "SCRIPT": f"const BINARIES = {json.dumps(binaries)};\n{script(one.modules)}",
+        "SCRIPT": f"const BINARIES = {json.dumps(found)};\n{code}",
     }
-    whole = (LAB / one.markup).read_text("utf-8")
     if name == "lessons.html":
         text = runpy.run_path(str(DOCS / "lessons" / "page" / "text.py"))
-        contents, chapters = text["lessons"](DOCS / "lessons")
-        whole = whole.replace("<!-- CONTENTS -->", contents).replace("<!-- LESSONS -->", chapters)
+        parts["CONTENTS"], parts["LESSONS"] = text["lessons"](DOCS / "lessons")
+    whole = (LAB / "page" / "frame.html").read_text("utf-8")
     for key, text in parts.items():
-        whole = whole.replace(f"/* {key} */", text)
-    if (size := len(whole.encode())) > one.most_bytes:
-        raise ValueError(f"{name} has {size} bytes, at most {one.most_bytes} are allowed")
+        whole = whole.replace(f"/* {key} */\n", f"{text}\n")
+    if (size := len(whole.encode())) > MOST_BYTES:
+        raise ValueError(f"{name} has {size} bytes, at most {MOST_BYTES} are allowed")
     return whole
 
 

@@ -180,7 +180,7 @@ def checked_configs(
     listed = [configs] if isinstance(configs, TrainingConfig) else entries_of(configs)
     if not listed:
         raise AntsError(f"configs is {shown(configs)}; give one TrainingConfig or several.")
-    complete = tuple(learners.with_hyperparameters(config) for config in listed)
+    complete = tuple(learners.registry.with_hyperparameters(config) for config in listed)
     if task is not None:
         for config in complete:
             check_learner(config, task)

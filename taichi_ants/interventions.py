@@ -31,6 +31,10 @@ if TYPE_CHECKING:
     from taichi_ants.grid.hexgrid import AxialGrid
     from taichi_ants.worlds.world import World
 
+__all__ = [
+    "AddAnts", "Clear", "Episode", "Intervention", "Move", "Place", "RemoveAnts", "SetAnts",
+    "SetEpsilon", "SetLearningRate", "SetTask", "SetTrail", "from_dict",
+]  # fmt: skip
 One = TypeVar("One", bound="ShorthandSettings")
 _MOST = 2**24  # ants, see `arguments.MAX_ANTS`
 _CELLS = Setting("cells, each [x, y, z], or the name of a region", or_region=True)
@@ -103,6 +107,10 @@ class Intervention(ShorthandSettings):
 
     `Interventions.apply` makes it. `in_all_worlds` says whether worlds of a colony share what it
     changes. A class with a path is added to `INTERVENTIONS`.
+
+    >>> Interventions(colony).apply(SetTrail(level=0))  # clears the trail
+    >>> colony.snapshot().trail.max().item()
+    0
     """
 
     in_all_worlds: ClassVar[bool] = False
@@ -172,6 +180,10 @@ class RemoveAnts(_OfAnts, path="remove_ants"):
     """Remove ants with the food that they carry: random ants, or those on cells; or of one nest.
 
     A share is rounded to a number of ants, halves up.
+
+    >>> Interventions(colony).apply(RemoveAnts(share=0.5))
+    >>> colony.living.sum().item()
+    8
     """
 
     share: Annotated[float | None, Setting("share of the living ants", least=0, most=1)] = None
@@ -184,12 +196,23 @@ class AddAnts(_OfAnts, path="add_ants"):
 
     A share of the living ants, or of those of the nest, is rounded to a number, halves up. Without
     `nest`, nests take turns, and ants on given cells belong to the nearest queen.
+
+    >>> change = Interventions(colony)
+    >>> change.apply(RemoveAnts(number=4))
+    >>> change.apply(AddAnts(number=2))
+    >>> colony.living.sum().item()
+    14
     """
 
 
 @dataclass(frozen=True)
 class SetAnts(Intervention, path="ants", short_for=("number",)):
-    """Set the number of living ants; ants with the highest numbers are removed first."""
+    """Set the number of living ants; ants with the highest numbers are removed first.
+
+    >>> Interventions(colony).apply(SetAnts(10))
+    >>> colony.living.sum().item()
+    10
+    """
 
     number: Annotated[int, Setting("number of ants", least=1, most=_MOST)]
 
@@ -200,6 +223,9 @@ class Place(Intervention, path="place", short_for=("cells",)):
 
     Rock and food leave out the cells of queens, and cells whose ant has no room nearby. Without
     `nest` or `kind`, the queen is that of nest 0, and the food is of the first kind.
+
+    >>> At(100, place=Place("rock", [(4, 0, 0)])).place.what
+    'rock'
     """
 
     what: Annotated[Literal["rock", "food", "queen"], Setting("thing to place")]
@@ -225,6 +251,9 @@ class Move(Intervention, path="move", short_for=("cells",)):
     """Move rock, food or the queen to an empty cell; an ant there moves aside.
 
     Has no effect if there is nothing to move, or the new cell is not free.
+
+    >>> At(100, move=[(4, 0, 0), (5, 0, 0)]).move
+    Move(cells=((4, 0, 0), (5, 0, 0)))
     """
 
     cells: Annotated[Sequence, Setting("cell to move from and cell to move to, each [x, y, z]")]
@@ -236,14 +265,22 @@ class Move(Intervention, path="move", short_for=("cells",)):
 
 @dataclass(frozen=True)
 class Clear(Intervention, path="clear", short_for=("cells",)):
-    """Remove rock and food from cells."""
+    """Remove rock and food from cells.
+
+    >>> At(100, clear=[(4, 0, 0)]).clear
+    Clear(cells=((4, 0, 0),))
+    """
 
     cells: Annotated[Sequence, _CELLS]
 
 
 @dataclass(frozen=True)
 class SetTrail(Intervention, path="trail", short_for=("level",)):
-    """Set the trail, or a further field, of cells, by default all, without rock; 0 clears it."""
+    """Set the level of the trail, or of another field, on cells without rock, by default on all.
+
+    >>> At(100, trail=SetTrail(25, cells=[(4, 0, 0)])).trail.level
+    25
+    """
 
     level: Annotated[int, Setting("trail level", least=0, most=MAX_DEPOSIT)]
     cells: Annotated[Sequence | None, _CELLS] = None
@@ -259,6 +296,9 @@ class SetTask(Intervention, path="task"):
     """Change settings of the task that kernels read as numbers, for example "pheromone.half_life".
 
     A setting by which kernels are compiled, such as the observation, cannot change in an episode.
+
+    >>> At(100, task={"pheromone.level": 300}).task
+    SetTask(values=(('pheromone.level', 300),))
     """
 
     values: tuple[tuple[str, Any], ...]  # the names of settings without "task.", and their values
@@ -309,7 +349,11 @@ class SetTask(Intervention, path="task"):
 
 @dataclass(frozen=True)
 class SetEpsilon(Intervention, path="epsilon", short_for=("value",)):
-    """Set the exploration rate, which then does not decay."""
+    """Set the exploration rate, which then does not decay.
+
+    >>> At(100, epsilon=0.2).epsilon
+    SetEpsilon(value=0.2)
+    """
 
     value: Annotated[Share, Setting("exploration rate")]
     in_all_worlds = True
@@ -317,7 +361,11 @@ class SetEpsilon(Intervention, path="epsilon", short_for=("value",)):
 
 @dataclass(frozen=True)
 class SetLearningRate(Intervention, path="learning_rate", short_for=("value",)):
-    """Set the learning rate, which then does not decay."""
+    """Set the learning rate, which then does not decay.
+
+    >>> At(100, learning_rate=0.02).learning_rate
+    SetLearningRate(value=0.02)
+    """
 
     value: Annotated[Share, Setting("learning rate")]
     in_all_worlds = True
@@ -329,13 +377,24 @@ class SetLearningRate(Intervention, path="learning_rate", short_for=("value",)):
 
 @dataclass(frozen=True)
 class Episode(Intervention, path="episode"):
-    """End the episode and begin the next one."""
+    """End the episode and begin the next one.
+
+    >>> Interventions(colony).apply(Episode())
+    >>> colony.episode, colony.ticks
+    (1, 0)
+    """
 
     in_all_worlds = True
 
 
 def from_dict(facts: Any) -> Intervention:
-    """Return the intervention of a mapping from its name to its settings or its short form."""
+    """Return the intervention of a mapping from its name to its settings or its short form.
+
+    The names are the keys of `At`, such as "remove_ants".
+
+    >>> from_dict({"remove_ants": {"share": 0.5}}) == from_dict({"remove_ants": 0.5})
+    True
+    """
     if not isinstance(facts, Mapping) or len(facts) != 1:
         names = ", ".join(INTERVENTIONS)
         refuse("an intervention", facts, f"a table with the name of one intervention: {names}")

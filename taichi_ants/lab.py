@@ -24,7 +24,7 @@ from taichi_ants.reference.random_stream import hash_of
 from taichi_ants.task import Task, queueing
 from taichi_ants.worlds.lab import STEPS, WORLDS, distance, lab_world
 
-STROKES = ("rock", "food", "scent", "erase")
+STROKES = ("rock", "food", "scent", "erase", "", "trail")
 SETTINGS = ("ants", "epsilon", "rate", "discount", "level", "shaping", "learns")
 LEARNERS = ("q_learning", "sarsa", "frozen")
 RULES, DIRECTED, QUEUES = (*range(8), 15), 1, 8
@@ -183,16 +183,16 @@ def _begun(scene: dict[str, Any], capacity: int) -> Colony:
     task = queueing() if scene["rules"] & QUEUES else task
     life = {"regrowth": None if scene["regrowth"] < 0 else scene["regrowth"]}
     task = task.replace(evaporation_in_training=True, life=life, **_numbers(scene))
-    learner, sharing, policy = scene["learner"], "shared", None
+    learner, policy = scene["learner"], None
     if learner == "frozen":
-        learner, sharing, policy = "q_learning", "frozen", trail_follower(task.observation)
+        learner, policy = "q_learning", trail_follower(task.observation)
     numbers = max(scene["rate"], 0.001), scene["discount"], scene["epsilon"], 1.0, 0.0
     colony = Colony(
         lab_world(scene["world"], scene["seed"]),
         task,
         TrainingConfig(learner, *numbers, initial_q=scene["first"]),
         *(scene["seed"], scene["ants"], capacity),
-        sharing=sharing,
+        sharing="shared" if policy is None else "frozen",
         q_values=policy,
     )
     colony.begin_episode()
@@ -203,9 +203,8 @@ def _begun(scene: dict[str, Any], capacity: int) -> Colony:
 
 def _numbers(scene: dict[str, Any]) -> dict[str, Any]:
     """Return the settings of the task that a visitor can change."""
-    pheromone = {"level": scene["level"]}
-    if scene["rules"] & DIRECTED:
-        pheromone["slope"] = max(1, (2 * scene["level"] + 50) // 100)
+    slope = {"slope": max(1, (2 * scene["level"] + 50) // 100)}
+    pheromone = {"level": scene["level"], **(slope if scene["rules"] & DIRECTED else {})}
     return {"pheromone": pheromone, "rewards": {"shaping": scene["shaping"]}}
 
 
@@ -216,8 +215,9 @@ def _changes(event: Event, scene: dict[str, Any], colony: Colony) -> Iterator[ch
     match event.does:
         case "rock" | "food":
             yield changes.Place(event.does, cells_within(event, colony.grid))
-        case "scent":
-            yield changes.SetTrail((scene["level"] + 1) // 2, cells_within(event, colony.grid))
+        case "scent" | "trail":
+            level = scene["level"] if event.does == "trail" else (scene["level"] + 1) // 2
+            yield changes.SetTrail(level, cells_within(event, colony.grid))
         case "erase":
             yield changes.Clear(cells_within(event, colony.grid))
             yield changes.SetTrail(0, cells_within(event, colony.grid))

@@ -81,7 +81,11 @@ class At(ProtocolEvent, path="at"):
     tick: Annotated[Tick, Setting("time of the event")]
 
     def times(self, length: int) -> range:
-        """Return the tick."""
+        """Return the tick, of an episode of this length.
+
+        >>> [*At(500, trail=0).times(1000)]
+        [500]
+        """
         return range(self._within("tick", length), self.tick + 1)
 
 
@@ -108,7 +112,7 @@ class Every(ProtocolEvent, path="every"):
             )
 
     def times(self, length: int) -> range:
-        """Return the ticks."""
+        """Return the ticks, of an episode of this length."""
         last = length - 1 if self.stop is None else min(self.stop, length - 1)
         return range(self._within("start", length), last + 1, self.ticks)
 
@@ -138,7 +142,11 @@ class When(ProtocolEvent, path="when"):
             raise AntsError("`when` needs a bound; give either `above` or `below`.")
 
     def times(self, length: int) -> range:
-        """Return the ticks of the checks."""
+        """Return the ticks of the checks, of an episode of this length.
+
+        >>> [*When("deliveries", above=20, ants=10).times(30)]
+        [10, 20]
+        """
         self._within("interval", length)
         return range(self.interval, length, self.interval)
 

@@ -37,7 +37,13 @@ class Registry(Generic[T]):
         self._register, self._load, self._reserved = register, load, reserved
 
     def get(self, name: str) -> T:
-        """Return the entry of this name; AntsError, with a list of all names, if there is none."""
+        """Return the entry of this name; AntsError, with a list of all names, if there is none.
+
+        >>> learners.get("sarsa").draws_next_action
+        True
+        >>> task.observations.get("ants").n_states
+        432
+        """
         if isinstance(name, str) and name in self.yours:
             return self.yours[name]
         if not isinstance(name, str) or name not in self.built_in:
@@ -45,7 +51,11 @@ class Registry(Generic[T]):
         return self._load(name) if self._load else self.built_in[name]
 
     def names(self) -> tuple[str, ...]:
-        """Return the names of all entries: those of the package, then yours as registered."""
+        """Return the names of all entries: those of the package, then yours as registered.
+
+        >>> "sarsa" in learners.names(), "open" in worlds.names()
+        (True, True)
+        """
         return (*self.built_in, *self.yours)
 
     def add(self, name: str, entry: T) -> T:
@@ -65,8 +75,9 @@ class Registry(Generic[T]):
 
     def unknown(self, name: object, otherwise: str = "") -> AntsError:
         """Return the error for a name that is not registered; `otherwise` is a further way out."""
-        similar = difflib.get_close_matches(str(name)[:80], self.names(), 1)
-        meant = f" (did you mean {similar[0]}?)" if similar else ""
+        names = {known.lower(): known for known in self.names()}
+        similar = difflib.get_close_matches(str(name)[:80].lower(), names, 1)
+        meant = f" (did you mean {names[similar[0]]}?)" if similar else ""
         known = f"choose one of {', '.join(self.names())}, {otherwise}or " if self.names() else ""
         return AntsError(
             f"there is no {self.kind} {shown(name)}{meant}; {known}register it with "

@@ -63,7 +63,8 @@ class Setting:
     Attributes:
         help: A phrase that describes the setting.
         unit: The unit of a number, for example "ticks".
-        least, most, above: Bounds: the smallest and the largest value, and an excluded lower bound.
+        least, most: The smallest and the largest value.
+        above: A lower bound that is not allowed itself.
         only: The name of another setting of the class, and the values of it that this setting
             requires; with other values it must have its default.
         usual: The value that replaces None where the setting has an effect.
@@ -133,7 +134,9 @@ class DeclaredSetting(NamedTuple):
         if self.is_group:
             words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
             form = self.kind.form or f"a {self.kind.__name__}"  # type: ignore[attr-defined]
-            return form + (f", or one of {words}" if words else "")
+            yours = any(setting.rule.choices for setting in declared(self.kind))
+            registered = ", or that of a plugin" if yours else ""
+            return form + (f", or one of {words}{registered}" if words else "")
         if self.kind is list:
             one = self.rule.or_region
             return "a list of cells, or the name of a region" if one else "a list of numbers"
@@ -212,6 +215,7 @@ class DeclaredSetting(NamedTuple):
             return self._named(value, {}) if isinstance(value, Mapping) else None
         if issubclass(self.kind, Settings):
             value = self.kind.converted(value)
+            value = self.kind.from_dict(value) if isinstance(value, Mapping) else value
         return value if isinstance(value, self.kind) else None
 
     def _named(self, value: Mapping[Any, Any], start: Mapping[str, Any]) -> Named[Any]:
@@ -277,13 +281,18 @@ class _Documentation:
     def __get__(self, _: object, cls: type) -> str:
         if not _is_ready(cls) or not declared(cls):
             return self._text
-        lines = [cleandoc(self._text), "", "Attributes:"]
-        for setting in declared(cls):
-            values, default, meaning = setting.in_words
-            absent = default if default == "required" else f"default: {default}"
-            line = f"{setting.name}: {meaning}; {values} ({absent})."
-            lines.append(fill(line, 100, initial_indent=" " * 4, subsequent_indent=" " * 8))
-        return "\n".join(lines)
+        return _described(self._text, "Attributes", declared(cls))
+
+
+def _described(text: str, heading: str, settings: Iterable[DeclaredSetting]) -> str:
+    """Return a docstring, followed by settings as they are declared."""
+    lines = [cleandoc(text), "", f"{heading}:"]
+    for setting in settings:
+        values, default, meaning = setting.in_words
+        absent = default if default == "required" else f"default: {default}"
+        line = f"{setting.name}: {meaning}; {values} ({absent})."
+        lines.append(fill(line, 100, initial_indent=" " * 4, subsequent_indent=" " * 8))
+    return "\n".join(lines)
 
 
 class Settings:
@@ -314,7 +323,10 @@ class Settings:
             known = [field.name for field in fields(cls)]
             for name in named:  # Python's own message has no path and no similar names
                 if name not in known:
-                    raise AntsError(f"`{_below(cls.path, name)}` {not_a_setting(name, known)}")
+                    groups = [setting for setting in declared(cls) if setting.is_group]
+                    below = [f"{g.name}.{name}" for g in groups if name in g.kind.__annotations__]
+                    says = not_a_setting(name, below or known)
+                    raise AntsError(f"`{_below(cls.path, name)}` {says}")
             return super().__new__(cls)
 
     def __post_init__(self) -> None:
@@ -391,6 +403,9 @@ class Settings:
         """Return the settings with changes; settings that lose their effect get their defaults.
 
         To change a group, give a mapping of its settings; its entry "" is the value to start from.
+
+        >>> Pheromone("exponential", half_life=30).replace(diffusion=0.1).half_life
+        30.0
         """
         for setting in declared(type(self)):
             name = setting.name
@@ -408,7 +423,11 @@ class Settings:
 
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
-        """Return the settings in a mapping, checked; groups are mappings or names."""
+        """Return the settings in a mapping, checked; groups are mappings or names.
+
+        >>> Task.from_dict({"observation": "ants", "pheromone": {"level": 300}}).pheromone.level
+        300
+        """
         return cls(**cls._required(facts)).replace(**facts)
 
     @classmethod
@@ -515,7 +534,10 @@ def checked(function: Function, path: str = "world") -> Function:
 
     @wraps(function)
     def calls(*positional: Any, **named: Any) -> Any:
-        arguments = form.bind(*positional, **named).arguments
+        try:
+            arguments = form.bind(*positional, **named).arguments
+        except TypeError as error:
+            raise TypeError(f"{function.__name__}() {error}") from None
         arguments |= {
             setting.name: setting.checked(arguments[setting.name])
             for setting in declared(function)
@@ -523,6 +545,8 @@ def checked(function: Function, path: str = "world") -> Function:
         }
         return function(**arguments)
 
+    if "Args:" not in (text := function.__doc__ or ""):
+        calls.__doc__ = _described(text, "Args", declared(function))
     return calls  # type: ignore[return-value]
 
 
@@ -539,10 +563,9 @@ def all_of(cls: Any) -> Iterator[DeclaredSetting]:
 
 def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
     """Return the end of a message about an unknown name, with the most similar known names."""
-    names = list(known)
+    names, sought = list(known), str(name).lower()
     # Longer names are similar by chance.
-    near = difflib.get_close_matches(str(name), names, 3, 0.6 if len(str(name)) < 9 else 0.75)
-    near = near or names
+    near = difflib.get_close_matches(sought, names, 3, 0.6 if len(sought) < 9 else 0.75) or names
     of = f" of {group}" if group else ""
     if not near:
         return f"is not a setting{of}, which has none; leave it out."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -64,6 +64,12 @@ def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
     use the rule. After each tick, cells, headings, loads, paper states, actions, events, rewards,
     states, levels and action values must be equal in every bit. AntsError if there is no rule of
     this name.
+
+    >>> @rules.register("deposit")
+    ... def refresh(level, carries, most=200):
+    ...     return max(level, most * carries)
+    >>> print(testing.check_rule("refresh", inputs=100))
+    refresh: 100 drawn inputs and 360 ticks of 6 colonies: equal
     """
     rule = rules.get(name)
     checked_whole("inputs", inputs)
@@ -79,6 +85,9 @@ def check_observation(name: str) -> RuleCheck:
 
     Small drawn colonies that use it are compared as in `check_rule`. The reference computes the
     view by a separate implementation. AntsError if there is no observation of this name.
+
+    >>> print(testing.check_observation("six_cells"))
+    six_cells: 360 ticks of 6 colonies: equal
     """
     observation = observations.get(name)
     runtime.start()
@@ -154,8 +163,8 @@ def _colonies(task: Task, seed: int) -> tuple[Colony, ReferenceColony]:
     """Return a drawn colony and its reference at the start of an episode."""
     world = _world(seed)
     learner = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 1.0) if task.needs_table else None
-    sharing = "frozen" if learner is None else "shared"
-    schedule = ("by_world", "by_chunk")[seed % 2]
+    sharing: Any = "frozen" if learner is None else "shared"
+    schedule: Any = ("by_world", "by_chunk")[seed % 2]
     colony = Colony(world, task, learner, seed, 12, sharing=sharing, schedule=schedule)
     plain = ReferenceColony(world, task, learner, seed, 12, sharing=sharing)
     colony.begin_episode(TICKS)

@@ -10,21 +10,25 @@ import pytest
 from taichi_ants import (
     Colony,
     Rewards,
+    Task,
     TrainingConfig,
     evaluate,
     learners,
     offline,
     record,
+    rendering,
     rollout,
     states,
     train,
 )
 from taichi_ants import worlds as places
+from taichi_ants.analysis.bounds import EpisodeBounds
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import Policy
 from taichi_ants.studies.command_line import Parser, notice
-from taichi_ants.viewer import check_page, page, record_colony
+from taichi_ants.viewer import page, record_colony
+from taichi_ants.viewer.page import check_page
 
 WORLD = places.paper()
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.9)
@@ -55,7 +59,7 @@ ODD = {
     "index": lambda _: WORLD.grid.cells(RAGGED),
     "a learner": lambda _: learners.get(LONG),
     "no learner": lambda _: learners.get(["sarsa"]),
-    "no configuration": lambda _: learners.with_hyperparameters(None),
+    "no configuration": lambda _: learners.registry.with_hyperparameters(None),
     "a long name": lambda _: learners.Learner(LONG, 3),
     "who is followed": lambda colony: record_colony(colony, follow=np.zeros(0)),
     "a state": lambda _: states.state_name(2**31),
@@ -64,7 +68,10 @@ ODD = {
     "an offline model's": lambda _: offline.model_based(data(), TABLE, initial_q="x"),
     "by run": lambda _: offline.fitted_q_iteration(data(), by_run=np.zeros(0)),
     "a penalty": lambda _: offline.pessimistic_q_iteration(data(), penalty=HUGE),
-    "a label": lambda _: learners.label(["sarsa"]),
+    "a label": lambda _: learners.registry.label(["sarsa"]),
+    "a picture's world": lambda _: rendering.picture(SCALAR),
+    "a snapshot's world": lambda _: rendering.at_start(SCALAR),
+    "a bound's world": lambda _: EpisodeBounds(SCALAR, Task()),
     "a page's path": lambda _: check_page(None),
     "a page": lambda _: page(SCALAR),
     "numbers of worlds": lambda _: Interventions(
@@ -72,7 +79,7 @@ ODD = {
     ),
     "two runs": lambda _: rollout(WORLD, train(WORLD, CONFIG, range(2), 1)),
     "two policies": lambda _: rollout(WORLD, np.zeros((2, 128, 5))),
-    "a world's name": lambda _: places.check_seed_counts(LONG),
+    "a world's name": lambda _: places.registry.check_seed_counts(LONG),
 }
 
 

@@ -86,12 +86,13 @@ def test_an_unknown_name_is_answered_with_the_known_ones(kind):
     register("weaker")
     similar = "weaker" if kind == "rule" else built_in
     known = f"(did you mean {similar}?); choose one of {', '.join(names())}, "
-    with pytest.raises(AntsError) as caught:
-        get(misspelled)
-    assert str(caught.value).startswith(f"there is no {kind} {misspelled!r} {known}")
-    assert str(caught.value).endswith(
-        ".register, for commands in a file that you give with --plugin."
-    )
+    for wrong in (misspelled, misspelled.upper()):
+        with pytest.raises(AntsError) as caught:
+            get(wrong)
+        assert str(caught.value).startswith(f"there is no {kind} {wrong!r} {known}")
+        assert str(caught.value).endswith(
+            ".register, for commands in a file that you give with --plugin."
+        )
     for name in ([built_in], None, "x" * 5000):
         with pytest.raises(AntsError):
             get(name)

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS
-from taichi_ants.learners import TrainingConfig, label
+from taichi_ants.learners import TrainingConfig
+from taichi_ants.learners.registry import label
 from taichi_ants.task import Task
 
 NAMES = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  # in columns and file names

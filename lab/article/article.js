@@ -1,7 +1,7 @@
 /* article.js: ten worlds in a text, and Python that replays the one that ran last. */
 
 import { linkOf } from "../page/link.js";
-import { Stage } from "./world.js";
+import { openPage, Stage } from "./world.js";
 
 class Article extends Stage {
   constructor() {
@@ -18,9 +18,4 @@ class Article extends Stage {
   }
 }
 
-try {
-  Object.assign(window, { article: new Article() });
-} catch (error) {
-  document.querySelector(".lead").insertAdjacentHTML("afterend", "<p>This browser cannot run the worlds below: they need WebAssembly with SIMD. The text can be read.</p>");
-  throw error;
-}
+openPage("article", Article);

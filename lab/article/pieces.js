@@ -56,7 +56,7 @@ export const PIECES = {
   },
   bridge: {
     ask: "Ants", options: [[4, "4"], [8, "8"], [24, "24"], [64, "64"]], from: 1,
-    unit: "% of carriers on the short way, on the right, after 2 000 ticks", ticks: 2000, speed: 8, seed: 9,
+    unit: "% of carriers on the short path, on the right, after 2 000 ticks", ticks: 2000, speed: 8, seed: 9,
     start: (ants) => ({ scene: { world: BRIDGE, ants } }),
     fact: (engine) => 100 - longShare({ engine }),
   },

@@ -200,3 +200,13 @@ export class Stage {
     if (running.length) requestAnimationFrame((next) => this.frame(next, now));
   }
 }
+
+/** Open a page of worlds under a name, or say why it cannot run. */
+export function openPage(name, Page) {
+  try {
+    window[name] = new Page();
+  } catch (error) {
+    document.querySelector(".lead").insertAdjacentHTML("afterend", "<p>This browser cannot run what is in this page: it needs WebAssembly with SIMD. The text can be read.</p>");
+    throw error;
+  }
+}

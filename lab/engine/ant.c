@@ -24,7 +24,6 @@ enum { ENTERS = 1, EXCHANGES = 2, REWARD_AT = 2 };
 #ifndef NOTE
 #define NOTE(ant, terminated, value) /* ant_page.c writes steps down */
 #endif
-#define INLINE static inline __attribute__((always_inline))
 #define LEVEL(level) (((level) + 1) * NO_LEVEL)
 
 /* A set of actions is a list: from the lowest bit, three bits for its length and for each action. */
@@ -135,9 +134,6 @@ static void pick_up(const Shared *shared, Ant *ant)
 
 INLINE void act(const Shared *shared, Ant *ant)
 {
-    static const int8_t turned[N_ACTIONS][8] = {{5, 0, 1, 2, 3, 4}, {0, 1, 2, 3, 4, 5},
-                                                {1, 2, 3, 4, 5, 0}, {0, 1, 2, 3, 4, 5},
-                                                {0, 1, 2, 3, 4, 5}};
     int action = ant->taken, effect = shared->effects[ROW * ant->state + action];
     if (effect & EXCHANGES) { /* rare */
         ant->delivered = ant->carries;
@@ -149,7 +145,7 @@ INLINE void act(const Shared *shared, Ant *ant)
     }
     int enters = effect & ENTERS;
     int cell = ant->cell + (shared->world->offsets[ant->heading + action] & -enters);
-    ant->heading = turned[action][ant->heading];
+    ant->heading = turned(ant->heading, action);
     ant->cell = cell;
     ant->delivered = 0;
     ant->reward = (effect >> REWARD_AT) - 1;

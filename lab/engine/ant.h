@@ -1,15 +1,13 @@
-/* Common parts of ant.c and ant_vector.c: the world, a run, and random numbers.
+/* Common parts of ant.c and ant_vector.c: the world, and a run.
  *
  * The world, rules, random numbers and arithmetic are those of the package (taichi_ants/task/rules,
  * taichi_ants/learners), so that results are equal to the bit if the compiler does not fuse
  * multiplications and additions (-ffp-contract=off).
  */
-#include <stdint.h>
+#include "common.h"
 
-enum { SEES_EMPTY, SEES_OBSTACLE, SEES_CUE, SEES_GOAL };
-enum { LEFT, FORWARD, RIGHT, PICK_UP, GIVE, N_ACTIONS };
 enum { Q_LEARNING, SARSA, DYNA_Q };
-enum { N_STATES = 128, N_HEADINGS = 6, DEPOSIT = 250 };
+enum { N_STATES = 128, DEPOSIT = 250 };
 
 /* Cells lie in flat arrays; a neighbour is a fixed step away. */
 typedef struct {
@@ -36,16 +34,3 @@ typedef struct {
     int32_t *steps;   /* (n, episodes) */
     int32_t *deliveries; /* (n, episodes), or NULL */
 } Job;
-
-static inline uint64_t draw(uint64_t *state)
-{
-    uint64_t z = *state += 0x9E3779B97F4A7C15u;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-    return z ^ (z >> 31);
-}
-
-static inline int below(uint64_t word, int n)
-{
-    return (int)((word * (uint64_t)n) >> 32);
-}

@@ -13,9 +13,10 @@
  * the pairs of state and action that had errors.
  */
 #include <math.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "common.h"
 #ifdef _OPENMP
 #include <omp.h>
 #else
@@ -44,9 +45,8 @@ enum {
 };
 
 enum { EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13 };
-enum { LEFT, FORWARD, RIGHT, PICK_UP, GIVE, N_ACTIONS };
 enum { ENTERED_EMPTY, FAILED, ENTERED_CUE, PICKED_UP, DELIVERED, PUSHED };
-enum { SEES_CUE = 2, ROW = 8, N_HEADINGS = 6 };
+enum { ROW = 8 };
 /* What the ant on a cell wants: nothing, to enter the cell at a heading, to take the food there. */
 enum { ENTER = 1, STANDS = 7, TAKE = 9, MARK = 15 };
 /* Flags in the same byte, which other ants read. */
@@ -109,19 +109,6 @@ typedef struct {
     int32_t *pairs[MOST_THREADS]; /* the pairs with errors: their number, then the pairs */
 } Work;
 
-#define INLINE static inline __attribute__((always_inline))
-
-INLINE uint64_t advance(uint64_t state) { return state + 0x9E3779B97F4A7C15u; }
-
-INLINE uint64_t bits_of(uint64_t z)
-{
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-    return z ^ (z >> 31);
-}
-
-INLINE int below(uint64_t word, int n) { return (int)((word * (uint64_t)n) >> 32); }
-
 INLINE int bit_number(unsigned mask, int k)
 {
 #ifdef __AVX2__
@@ -134,14 +121,6 @@ INLINE int bit_number(unsigned mask, int k)
 }
 
 INLINE int round_turned(int heading) { return heading < 3 ? heading + 3 : heading - 3; }
-
-INLINE int turned(int heading, int action)
-{
-    static const uint8_t after[N_ACTIONS][8] = {
-        {5, 0, 1, 2, 3, 4}, {0, 1, 2, 3, 4, 5}, {1, 2, 3, 4, 5, 0},
-        {0, 1, 2, 3, 4, 5}, {0, 1, 2, 3, 4, 5}};
-    return after[action][heading];
-}
 
 /* 0 for actions that do not move. */
 INLINE int code_in_view(int percept, int action) { return percept << 2 * action >> 4 & 3; }
@@ -647,31 +626,3 @@ static void note_best(const Colony *c, const Work *w)
 
 /* Return how many cells `around` reads before and after an array with a byte for each cell. */
 static int margin(const Colony *c) { return c->steps[2] + 2; }
-
-/* Run an episode of some ticks, in which ants start without food. */
-void run(Colony *c, int rules, int ticks, int threads)
-{
-    Work w = {0};
-    size_t pairs = (size_t)c->states * ROW, groups = c->size / CELLS_TOGETHER + 1;
-    uint8_t *wants = calloc(c->size + 2 * margin(c), 1);
-    w.ants = calloc(c->n, sizeof *w.ants);
-    w.spare = malloc(c->n * sizeof *w.spare);
-    w.places = malloc(groups * threads * sizeof *w.places);
-    w.wants = wants + margin(c);
-    w.greedy = malloc(c->states * sizeof *w.greedy);
-    for (int t = 0; t < threads; t++) {
-        w.errors[t] = calloc(pairs + 64, sizeof **w.errors); /* no cache line is shared */
-        w.pairs[t] = calloc(pairs + 64, sizeof **w.pairs);
-    }
-    for (int i = 0; i < c->n; i++) {
-        w.ants[i].random = c->random[i];
-        w.ants[i].cell = c->cells[i];
-        w.ants[i].heading = c->headings[i];
-    }
-    note_best(c, &w);
-    look_around(c, &w, rules, 0);
-    pass_ticks(c, &w, rules, 0, ticks, threads);
-    for (int t = 0; t < threads; t++)
-        free(w.errors[t]), free(w.pairs[t]);
-    free(w.ants), free(w.spare), free(w.places), free(wants), free(w.greedy);
-}

@@ -1,5 +1,5 @@
 /* The grid of taichi_ants/grid/hexgrid.py: cells of ranges X, Y, Z in rows, with a border around
- * them; and the first states of random streams. Include it after the random numbers. */
+ * them; and the purposes of random streams. */
 #include <stddef.h>
 
 enum { STREAM_ANT = 0, STREAM_START_CELL = 2, STREAM_START_HEADING = 3, STREAM_BORN = 4,
@@ -61,18 +61,4 @@ static int64_t rank_of(const Grid *g, int cell)
     if (x == 0)
         return (int64_t)y * g->z + z;
     return (int64_t)g->y * g->z + (int64_t)(x - 1) * (g->y + g->z - 1) + (y ? g->z + y - 1 : z);
-}
-
-static uint64_t mixed(uint64_t z)
-{
-    z += 0x9E3779B97F4A7C15u;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-    return z ^ (z >> 31);
-}
-
-/* The first state of a random stream; see taichi_ants/grid/randomness.py. */
-static uint64_t stream_of(uint64_t seed, uint64_t purpose, uint64_t number)
-{
-    return mixed(mixed(mixed(seed) ^ purpose) ^ number);
 }

@@ -2,8 +2,9 @@
  * opened. With ?teachers in the address, all answers are open, and notes for teachers are shown. */
 
 import { EXPERIMENTS, ACTS, nameOf, SETTINGS, viewOf, written } from "../../docs/lessons/page/experiments.js";
-import { Stage } from "../article/world.js";
+import { openPage, Stage } from "../article/world.js";
 import { LoneAnts, STEPS } from "../page/engine.js";
+import { escaped, plotOf, tableOf } from "../page/figures.js";
 import { centre } from "../page/geometry.js";
 import { LOOKS } from "../page/looks.js";
 import { glyph } from "../page/mind.js";
@@ -11,25 +12,6 @@ import { glyph } from "../page/mind.js";
 // @ts-ignore: build.py declares it before all modules
 const ANT = BINARIES.ANT_WASM;
 const RANGE = 10, FIRST_CELL = [-8, 0];       // of the paper's world: its size, and where ants start
-const MOST = 660, H = 230, LEFT = 38;         // of a plot, in CSS pixels: its greatest width, its height, the place for numbers
-const DASHES = ["", "7 4", "2 3", "11 3 2 3"], COLOURS = ["--accent", "--focus", "--soft", "--text"];
-
-const escaped = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;");
-const rowOf = (cells, tag) => `<tr>${cells.map((cell) => `<${tag}>${escaped(cell)}</${tag}>`).join("")}</tr>`;
-const tableOf = (head, rows) => `<div class="wide"><table>${head ? rowOf(head, "th") : ""}${rows.map((row) => rowOf(row, "td")).join("")}</table></div>`;
-
-/** Lines of a plot as a picture as wide as the page allows, with a legend in words, colours and dashes. */
-function plotOf(lines, across) {
-  const W = Math.min(MOST, innerWidth - 40), all = lines.flatMap(([, values]) => [...values]), high = Math.max(...all), low = Math.min(0, ...all);
-  const y = (value) => H - 8 - (value - low) / (high - low || 1) * (H - 22), x = (k, n) => LEFT + k / (n - 1) * (W - LEFT - 8);
-  const scale = [low, (low + high) / 2, high].map((value) => `<path d="M${LEFT},${y(value)}H${W}" stroke="var(--line)"/>`
-    + `<text x="${LEFT - 6}" y="${y(value) + 4}" text-anchor="end">${value.toFixed(high - low < 2 ? 1 : 0)}</text>`);
-  const style = (k) => `stroke="var(${COLOURS[k]})" stroke-width="2" stroke-dasharray="${DASHES[k]}" fill="none"`;
-  const drawn = lines.map(([, values], k) => `<path d="${[...values].map((value, j) => `${j ? "L" : "M"}${x(j, values.length).toFixed(1)},${y(value).toFixed(1)}`).join("")}" ${style(k)}/>`);
-  const legend = lines.map(([name], k) => `<span><svg width="28" height="6" aria-hidden="true"><path d="M0,3h28" ${style(k)}/></svg> ${escaped(name)}</span>`);
-  return `<div class="plot"><p>${legend.join("")}</p><svg width="${W}" height="${H}" role="img" aria-label="${escaped(across)}">${scale.join("")}${drawn.join("")}</svg><p>${escaped(across)}</p></div>`;
-}
-
 /** The recorded steps of lone ants: a map, a slider, and what happened in a step. */
 class Walk {
   place; walks; bar;
@@ -224,9 +206,4 @@ class Lessons extends Stage {
   }
 }
 
-try {
-  Object.assign(window, { lessons: new Lessons() });
-} catch (error) {
-  document.querySelector(".lead").insertAdjacentHTML("afterend", "<p>This browser cannot run the experiments below: they need WebAssembly with SIMD. The text can be read.</p>");
-  throw error;
-}
+openPage("lessons", Lessons);

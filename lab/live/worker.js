@@ -2,8 +2,8 @@
  * taichi_ants/live/server.py does, with the same frames; of the edits, it knows those of EDITS. */
 
 import HEADERS from "./headers.json" with { type: "json" };
-import { CAPACITY, EMPTY, Engine, FOOD, LEARNERS, ROCK } from "../page/engine.js";
-import { decode, partsOf } from "../page/link.js";
+import { CAPACITY, Engine, LEARNERS } from "../page/engine.js";
+import { decode, linkOf, partsOf } from "../page/link.js";
 import { SCENE } from "../page/worlds.js";
 
 const FRAMES_A_SECOND = 30, FASTEST = 1000; // as in server.py
@@ -12,31 +12,19 @@ const BUSY_MS = 25, TICKS_AT_ONCE = 8;      // of a frame at the fastest speed
 const MOST_TICKS = 200_000, MOST_LOOKED_BACK = 2_000_000; // of a visit; these times its ants
 const LEARNER_LABELS = ["Q-learning", "SARSA"];
 
-/** What an edit does to an engine; `value` are its settings. */
+/** The changes of a visit that an edit is, see engine.js; `value` are its settings. */
 const EDITS = {
-  place: (engine, { what, cells }) => put(engine, cells, { rock: ROCK, food: FOOD }[what]),
-  clear: (engine, { cells }) => put(engine, cells, EMPTY),
-  trail: (engine, { level, cells }) => engine.wasm.lay_scent(brushed(engine, cells), level),
-  ants: (engine, value) => engine.wasm.set_ants(Math.min(value, engine.wasm.room())),
-  epsilon: (engine, value) => {
-    engine.scene.epsilon = value;
-    engine.setNumbers();
-  },
-  learning_rate: (engine, value) => {
-    Object.assign(engine.scene, { rate: value, learns: 1 });
-    engine.setRate();
-  },
+  place: (engine, { what, cells }) => drawn({ rock: "rock", food: "food" }[what], cells),
+  clear: (engine, { cells }) => drawn("erase", cells),
+  trail: ({ scene }, { level, cells }) => drawn({ 0: "erase", [scene.level]: "trail" }[level], cells),
+  ants: (engine, value) => [{ do: "ants", value }],
+  epsilon: (engine, value) => [{ do: "epsilon", value }],
+  learning_rate: ({ scene }, value) => [{ do: "rate", value }, ...(scene.learns ? [] : [{ do: "learns", value: 1 }])],
 };
 
-function brushed(engine, cells) {
-  const once = [...new Set(cells)];
-  engine.brush.set(once);
-  return once.length;
-}
-
-function put(engine, cells, what) {
-  if (what === undefined) throw new Error("only rock and food can be placed here.");
-  engine.wasm.put(brushed(engine, cells), what);
+function drawn(what, path) {
+  if (!what) throw new Error("only rock, food and trails like those of new deposits can be drawn here.");
+  return [{ do: what, reach: 0, path }];
 }
 
 export class LiveColony {
@@ -64,7 +52,7 @@ export class LiveColony {
     }
     const { scene, events, tick } = visit, end = Math.min(tick ?? 0, MOST_TICKS);
     this.scene = scene;
-    this.start(events, [], Math.max(0, end - Math.floor(MOST_LOOKED_BACK / scene.ants)));
+    this.start(events, Math.max(0, end - Math.floor(MOST_LOOKED_BACK / scene.ants)));
     this.sendBegin();
     while (this.engine.tick < end) { // the page can look back at each tick
       this.advance(1);
@@ -74,31 +62,26 @@ export class LiveColony {
     this.sendState();
   }
 
-  /** Begin a session: with the events of a link, and with the edits of another session. */
-  start(events, edits = [], tick = 0) {
-    this.events = events;
-    this.edits = [];
+  /** Begin a session with events, at a tick. */
+  start(events, tick = 0) {
+    this.strokes = []; // of the user; an undo goes back to where one began
     this.engine = new Engine(this.module, this.scene, events);
     this.capacity = Math.min(2 * this.engine.ants + 64, CAPACITY);
     this.note();
     this.pack(false, false);
-    for (const one of [...edits, { tick }]) {
-      if (one.tick > this.engine.tick) {
-        this.engine.pass(one.tick - this.engine.tick);
-        this.note();
-      }
-      if (one.edit) this.apply(one.edit, one.stroke);
-    }
+    this.engine.pass(tick);
+    if (tick) this.note();
     this.pack(false, false);
     [this.playing, this.owed] = [false, 0];
     this.sessions++;
   }
 
   apply(edit, stroke) {
-    const [[name, value]] = Object.entries(edit);
+    const { engine, strokes } = this, [[name, value]] = Object.entries(edit);
     if (!Object.hasOwn(EDITS, name)) throw new Error(`this page cannot do that (${name}); the live page of the Python package can.`);
-    EDITS[name](this.engine, value);
-    this.edits.push({ tick: this.engine.tick, edit, stroke });
+    const changes = EDITS[name](engine, value);
+    if (strokes[strokes.length - 1]?.stroke !== stroke) strokes.push({ stroke, tick: engine.tick, before: [...engine.events, ...engine.later] });
+    for (const change of changes) engine.apply(change);
   }
 
   get rate() {
@@ -170,7 +153,7 @@ export class LiveColony {
     };
     if (learner !== LEARNERS.frozen) values.learning_rate = of({ value: this.rate, step: 0.001, path: "learning_rate", help: "step size of updates" });
     this.stateDue = performance.now() + STATE_MS;
-    this.say("state", { playing: this.playing, speed: this.speed, pages: 1, ticks: engine.tick, can_undo: this.edits.length > 0, can_go_back: false, values, works: [] });
+    this.say("state", { playing: this.playing, speed: this.speed, pages: 1, ticks: engine.tick, can_undo: this.strokes.length > 0, can_go_back: false, values, works: [], link: linkOf(engine) });
   }
 
   /** The header of `Recorder.header` in taichi_ants/viewer/recorder.py. */
@@ -190,7 +173,7 @@ export class LiveColony {
 
   /** Perform a request, or say why not. */
   receive(message) {
-    const request = JSON.parse(message), { edits } = this;
+    const request = JSON.parse(message), { strokes } = this;
     const acts = {
       play: () => Object.assign(this, { playing: true, due: performance.now() }),
       pause: () => Object.assign(this, { playing: false }),
@@ -204,9 +187,10 @@ export class LiveColony {
         this.show(this.pack(false, false));
       },
       undo: () => {
-        if (!edits.length) throw new Error("there is nothing to undo: this session has no interventions.");
-        const first = edits.findIndex(({ stroke }) => stroke === edits[edits.length - 1].stroke);
-        this.start(this.events, edits.slice(0, first), edits[first].tick);
+        const last = strokes.pop();
+        if (!last) throw new Error("there is nothing to undo: this session has no interventions.");
+        this.start(last.before, last.tick);
+        this.strokes = strokes;
         this.sendBegin();
       },
       restart: () => {

@@ -9,10 +9,11 @@
  *
  *   engine.pass(ticks)    events of a replay are applied on the way, each at its tick
  *   engine.apply(event)   a change between two ticks, which is recorded in `engine.events`:
- *     { do: "rock" | "food" | "scent" | "erase", reach: 0..7, path: [cells] }
+ *     { do: "rock" | "food" | "scent" | "trail" | "erase", reach: 0..7, path: [cells] }
  *       a stroke: all cells within `reach` of a path of adjacent cells. While a visitor draws, apply
  *       the new cells of each frame as a separate event, without the last cell of the one before
  *       (a link then writes them as one stroke). Cells outside the world are dropped.
+ *       A trail is as strong as new scent of ants, "scent" half as strong.
  *     { do: "ants" | "epsilon" | "rate" | "discount" | "level" | "shaping" | "learns", value }
  *       `level` is how long new scent lasts, in ticks; `learns` is 0 or 1. Values are rounded to
  *       what links can have (see LIMITS); `engine.scene` has the result.
@@ -39,8 +40,7 @@
  *
  * LONE ANTS (ant.wasm)
  *   const lone = new LoneAnts(module)
- *   lone.train({ learner, rate, discount, epsilon, decay, planningSteps, truncates, seeds, episodes,
- *                maxSteps, notes }) -> { returns, steps, deliveries }, each Int32Array (seeds * episodes);
+ *   lone.train({ ... })   gives { returns, steps, deliveries }, each Int32Array (seeds * episodes)
  *   lone.values   the tables of the last call, Float32Array (seeds * 640)
  *   lone.notes    of one seed, its first steps (at most `notes`), each an object with NOTES
  *   lone.follow(tables, { seeds, rollout, maxSteps, notes })   the same for ants that only follow their tables
@@ -51,7 +51,7 @@ import FOLLOWERS from "./followers.json" with { type: "json" };
 import { makeWorld } from "./worlds.js";
 
 /** @typedef {import("./worlds.js").Scene} Scene */
-/** @typedef {{ do: "rock" | "food" | "scent" | "erase", reach: number, path: number[], tick?: number }} Stroke */
+/** @typedef {{ do: "rock" | "food" | "scent" | "trail" | "erase", reach: number, path: number[], tick?: number }} Stroke */
 /** @typedef {{ do: "ants" | "epsilon" | "rate" | "discount" | "level" | "shaping" | "learns", value: number, tick?: number }} Setting */
 /** @typedef {Stroke | Setting} Change */
 
@@ -232,9 +232,10 @@ export class Engine {
   paint(stroke) {
     const cells = [...new Set(stroke.path.flatMap((cell) => this.disc(cell, stroke.reach)))];
     this.brush.set(cells);
-    if (stroke.do !== "scent") this.wasm.put(cells.length, { rock: ROCK, food: FOOD, erase: EMPTY }[stroke.do]);
-    if (stroke.do === "scent" || stroke.do === "erase")
-      this.wasm.lay_scent(cells.length, stroke.do === "scent" ? Math.floor((this.scene.level + 1) / 2) : 0);
+    const ground = { rock: ROCK, food: FOOD, erase: EMPTY }[stroke.do], { level } = this.scene;
+    if (ground !== undefined) this.wasm.put(cells.length, ground);
+    const laid = { scent: Math.floor((level + 1) / 2), trail: level, erase: 0 }[stroke.do];
+    if (laid !== undefined) this.wasm.lay_scent(cells.length, laid);
     this.changed = true;
   }
 

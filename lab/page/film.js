@@ -3,6 +3,7 @@
 import { byId } from "./controls.js";
 
 const SECONDS = 6, BITS = 3.4e6, MOST_PIXELS_WIDE = 900, FRAMES = 30; // 3.4 Mbit/s: about 2.6 MB
+const CANNOT = "This browser cannot record a canvas.";
 const TYPES = ["video/mp4;codecs=avc1.42E01F", "video/mp4", "video/webm;codecs=vp9", "video/webm"];
 
 export class Film {
@@ -14,7 +15,7 @@ export class Film {
 
   start() {
     const { lab } = this, type = window.MediaRecorder && TYPES.find((one) => MediaRecorder.isTypeSupported(one));
-    if (!type) return lab.toast("This browser cannot record a canvas.");
+    if (!type) return lab.toast(CANNOT);
     if (this.copy) return undefined;
     const canvases = lab.sides.filter((side) => side.run).map((side) => side.canvas);
     const copy = this.copy = document.createElement("canvas"), [{ width, height }] = canvases;
@@ -44,11 +45,12 @@ export class Film {
   save(blob) {
     this.copy = null;
     this.bytes = blob.size;
+    if (!blob.size) return this.lab.toast(CANNOT); // it lacks the encoder
     const link = document.createElement("a"), { tick, scene } = this.lab.runs[0];
     link.href = URL.createObjectURL(blob);
     link.download = `ants-${scene.seed}-${tick}.${blob.type.includes("mp4") ? "mp4" : "webm"}`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-    this.lab.toast(`Saved a video of ${(blob.size / 1e6).toFixed(1)} MB.`);
+    return this.lab.toast(`Saved a video of ${(blob.size / 1e6).toFixed(1)} MB.`);
   }
 }

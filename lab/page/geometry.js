@@ -1,5 +1,7 @@
 /* geometry.js: where cells lie. The unit of length is the distance from the centre of a cell to its corners. */
 
+import { wordOf } from "./worlds.js";
+
 export const ROOT3 = Math.sqrt(3);
 
 /** The centre of a cell; y points down, heading 0 up. @returns {[number, number]} */
@@ -18,10 +20,5 @@ export function cellAt(x, y) {
   return [Q, R];
 }
 
-/** A whole number below n that looks random but depends only on a and b (a hash of 32 bits). */
-export function scatter(a, b, n) {
-  let h = Math.imul(a ^ 0x9e3779b9, 0x85ebca6b) ^ Math.imul(b + 0x7f4a7c15, 0xc2b2ae35);
-  h = Math.imul(h ^ h >>> 15, 0x2c1b3c6d);
-  h = Math.imul(h ^ h >>> 12, 0x297a2d39);
-  return ((h ^ h >>> 15) >>> 0) % n;
-}
+/** A whole number below n that looks random but depends only on a and b. */
+export const scatter = (a, b, n) => wordOf(a, b) % n;

@@ -2,10 +2,11 @@
 
 import { byId } from "./controls.js";
 import { GRID, LoneAnts } from "./engine.js";
+import { pictureOf, plotOf, tableOf } from "./figures.js";
 import { many } from "./story.js";
 
-const SEEDS = 100, EPISODES = 500, LAST = 100; // the paper's; results are means over the last episodes
-const MOST_WORKERS = 4, SMOOTH = 10;           // episodes that a point of a curve covers
+const SEEDS = 100, EPISODES = 500, LAST = 100; // the paper's; a quarter of the seeds is a whole number; results are means over the last episodes
+const SMOOTH = 10; // episodes that a point of a curve covers
 const NAMES = { q_learning: "Q-learning", sarsa: "SARSA", dyna_q: "Dyna-Q" };
 const nameOf = ({ learner, planningSteps }) => NAMES[learner] + (planningSteps ? `, ${planningSteps} planning steps` : "");
 const CHOICES = [["learner", "Learner"], ["truncates", "A delivery"], ["rate", "Learning rate"], ["discount", "Discount"],
@@ -23,17 +24,8 @@ onmessage = ({ data }) => {
 
 const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
 
-/** The mean of the middle half; a quarter of the values is left out at each end. */
-export function interquartileMean(values) {
-  const sorted = [...values].sort((a, b) => a - b), cut = sorted.length / 4, whole = Math.floor(cut);
-  let sum = 0, weight = 0;
-  sorted.forEach((value, k) => {
-    const inside = Math.max(0, Math.min(k + 1, sorted.length - cut) - Math.max(k, cut));
-    sum += inside * value;
-    weight += inside;
-  });
-  return weight ? sum / weight : sorted[whole];
-}
+/** The mean of the middle half. */
+const interquartileMean = (values) => mean([...values].sort((a, b) => a - b).slice(SEEDS / 4, 3 * SEEDS / 4));
 
 /** For each run, its mean over the last episodes. */
 const lastOf = (values, seeds) => Array.from({ length: seeds }, (_, k) => mean(values.subarray((k + 1) * EPISODES - LAST, (k + 1) * EPISODES)));
@@ -69,14 +61,13 @@ export class Training {
       <div class="choices">${CHOICES.map(options).join("")}</div>
       <p class="acts"><button id="t-one">Train ${SEEDS} ants</button><button id="t-grid">Train the whole grid: ${many(GRID.length * SEEDS)} ants</button></p>
       <progress id="t-bar" max="1" value="0" hidden aria-label="Trained so far"></progress>
-      <canvas id="t-plot" role="img" aria-label="Return of an episode, mean over seeds with its 95 % interval"></canvas><div id="t-results" aria-live="polite"></div>`;
+      <div id="t-plot"></div><div id="t-results" aria-live="polite"></div>`;
     byId("t-one").addEventListener("click", () => this.one());
     byId("t-grid").addEventListener("click", () => this.grid());
     this.dialog.querySelector(".close").addEventListener("click", () => this.dialog.close());
     this.dialog.showModal();
     this.lab.play(false);
     this.curves = [];
-    this.draw();
   }
 
   stop() {
@@ -88,7 +79,7 @@ export class Training {
   train(settings, done) {
     this.stop();
     const url = URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" }));
-    const count = Math.min(MOST_WORKERS, settings.length, navigator.hardwareConcurrency || 1);
+    const count = Math.min(settings.length, navigator.hardwareConcurrency || 1);
     this.workers = Array.from({ length: count }, () => new Worker(url));
     let next = 0, left = settings.length;
     const seeds = Array.from({ length: SEEDS }, (_, k) => k);
@@ -142,73 +133,23 @@ export class Training {
     this.rows = rows;
     const best = [...rows].sort((a, b) => b.iqm - a.iqm).slice(0, 5);
     byId("t-results").innerHTML = `<p>${many(GRID.length * SEEDS)} ants in ${((performance.now() - began) / 1000).toFixed(1)} s. The five settings with the highest IQM of the return:</p>`
-      + `<table><thead><tr>${CHOICES.map(([, label]) => `<th>${label}</th>`).join("")}<th>Mean</th><th>IQM</th><th>Deliveries (IQM)</th></tr></thead><tbody>`
-      + best.map((row) => `<tr>${CHOICES.map(([name]) => `<td>${wordingOf(name, row.setting)}</td>`).join("")}<td>${row.mean.toFixed(1)}</td><td>${row.iqm.toFixed(1)}</td><td>${row.home.toFixed(2)}</td></tr>`).join("")
-      + "</tbody></table>";
+      + tableOf([...CHOICES.map(([, label]) => label), "Mean", "IQM", "Deliveries (IQM)"],
+                best.map((row) => [...CHOICES.map(([name]) => wordingOf(name, row.setting)), row.mean.toFixed(1), row.iqm.toFixed(1), row.home.toFixed(2)]));
   }
 
-  /** A clean canvas, its size in CSS pixels, and colours. */
-  surface() {
-    const canvas = byId("t-plot"), dpr = Math.min(2, devicePixelRatio || 1), [w, h] = [canvas.clientWidth, canvas.clientHeight];
-    [canvas.width, canvas.height] = [w * dpr, h * dpr];
-    const x = canvas.getContext("2d");
-    x.scale(dpr, dpr);
-    x.font = "11.5px Inter, system-ui, sans-serif";
-    return { x, w, h, colours: this.lab.colours };
-  }
-
+  /** The latest curve first. */
   draw() {
-    const { x, w, h, colours } = this.surface(), all = this.curves.flatMap(({ points }) => points);
-    const low = Math.min(0, ...all.map((p) => p.mean - p.half)), high = Math.max(10, ...all.map((p) => p.mean + p.half));
-    const px = (episode) => 34 + episode / EPISODES * (w - 40), py = (v) => h - 20 - (v - low) / (high - low) * (h - 34);
-    [x.fillStyle, x.strokeStyle, x.textAlign] = [colours.soft, colours.line, "right"];
-    for (const v of [low, 0, high]) {
-      x.fillText(v.toFixed(0), 28, py(v) + 4);
-      x.beginPath();
-      x.moveTo(34, py(v));
-      x.lineTo(w, py(v));
-      x.stroke();
-    }
-    x.fillText(`episode ${EPISODES}`, w - 4, h - 5);
-    this.curves.forEach(({ setting, points }, k) => {
-      const colour = k === this.curves.length - 1 ? colours.accent : colours.soft;
-      [x.fillStyle, x.strokeStyle, x.lineWidth] = [colour, colour, 2];
-      x.beginPath();
-      points.forEach((p, j) => x[j ? "lineTo" : "moveTo"](px(p.episode), py(p.mean + p.half)));
-      for (const p of [...points].reverse()) x.lineTo(px(p.episode), py(p.mean - p.half));
-      x.globalAlpha = 0.22;
-      x.fill();
-      x.globalAlpha = 1;
-      x.beginPath();
-      points.forEach((p, j) => x[j ? "lineTo" : "moveTo"](px(p.episode), py(p.mean)));
-      x.setLineDash(k === this.curves.length - 1 ? [] : [5, 4]);
-      x.stroke();
-      x.setLineDash([]);
-      x.textAlign = "right";
-      x.fillText(CHOICES.map(([name]) => wordingOf(name, setting)).join(" · "), w - 6, h - 30 - 17 * (this.curves.length - 1 - k));
-    });
+    const lines = [...this.curves].reverse().map(({ setting, points }) => /** @type {[string, number[], number[]]} */ (
+      [CHOICES.map(([name]) => wordingOf(name, setting)).join(" · "), points.map((p) => p.mean), points.map((p) => p.half)]));
+    byId("t-plot").innerHTML = plotOf(lines, `Return of an episode, from the first to episode ${EPISODES}: mean of ${SEEDS} ants with its 95 % interval`);
   }
 
+  /** For each learner, a dot for the IQM of each setting. */
   drawGrid(rows) {
-    const { x, w, h, colours } = this.surface(), names = [...new Set(GRID.map(nameOf))], space = (h - 22) / names.length;
-    const all = rows.map((row) => row.iqm), low = Math.floor(Math.min(...all) - 1), high = Math.ceil(Math.max(...all) + 1);
-    const px = (v) => 10 + (v - low) / (high - low) * (w - 20);
-    names.forEach((name, k) => {
-      [x.fillStyle, x.textAlign] = [colours.text, "left"];
-      x.fillText(name, 0, k * space + 12);
-      x.fillStyle = colours.accent;
-      x.globalAlpha = 0.6;
-      for (const { setting, iqm } of rows) {
-        if (nameOf(setting) !== name) continue;
-        x.beginPath();
-        x.arc(px(iqm), k * space + (setting.truncates ? 24 : 36), 4, 0, 7);
-        x.fill();
-      }
-      x.globalAlpha = 1;
-    });
-    x.fillStyle = colours.soft;
-    x.fillText(low.toFixed(0), 6, h - 5);
-    x.textAlign = "right";
-    x.fillText(`${high.toFixed(0)} return of an episode (IQM); upper row: deliveries truncate`, w - 4, h - 5);
+    const names = [...new Set(GRID.map(nameOf))], all = rows.map((row) => row.iqm), low = Math.floor(Math.min(...all)), high = Math.ceil(Math.max(...all));
+    const x = (value) => (10 + 740 * (value - low) / (high - low || 1)).toFixed(1), text = (words, at, y, anchor = "start") => `<text x="${at}" y="${y}" text-anchor="${anchor}">${words}</text>`;
+    const dots = rows.map(({ setting, iqm }) => `<circle cx="${x(iqm)}" cy="${52 * names.indexOf(nameOf(setting)) + (setting.truncates ? 25 : 38)}" r="4.5" fill="var(--accent)" opacity=".6"/>`);
+    const words = [...names.map((name, k) => text(name, 0, 52 * k + 13)), text(String(low), 4, 226), text(`${high}: return of an episode (IQM)`, 756, 226, "end")];
+    byId("t-plot").innerHTML = `<div class="plot">${pictureOf([...dots, ...words], 760, 230, "Return of an episode by learner")}<p>A dot is a setting. In the upper row of a learner, deliveries truncate.</p></div>`;
   }
 }

@@ -30,8 +30,8 @@ const PAINTS_EMPTY = 0, PAINTS_SCENT = 2, PAINTS_ROCK = 5, PAINTS_FOOD = 7;
 const STEP_Q = [1, 1, 0, -1, -1, 0], STEP_R = [0, 1, 1, 0, -1, -1];
 const lengthOf = (q, r) => Math.max(q, r, 0) - Math.min(q, r, 0);
 
-/** A random word of 32 bits. */
-function wordOf(seed, number) {
+/** A random word of 32 bits: a hash of two numbers. */
+export function wordOf(seed, number) {
   let word = Math.imul(seed ^ 0x9E3779B9, 0x85EBCA6B) ^ Math.imul(number + 0x7F4A7C15, 0xC2B2AE35);
   word = Math.imul(word ^ word >>> 15, 0x2C1B3C6D);
   word = Math.imul(word ^ word >>> 12, 0x297A2D39);

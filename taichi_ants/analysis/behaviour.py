@@ -16,6 +16,7 @@ from taichi_ants.task.constants import N_STATES, RIGHT, SEES_CUE
 if TYPE_CHECKING:
     from taichi_ants.engines.runs.results import Trace
 
+__all__ = ["BEHAVIOURS", "classify"]
 # A behaviour is an index into this list.
 BEHAVIOURS = ("delivers", "walks the trail", "circles with food", "other")
 DELIVERS, WALKS, CIRCLES, OTHER = range(len(BEHAVIOURS))
@@ -25,8 +26,16 @@ _PAID_SHARE = 0.25
 def classify(trace: Trace, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the behaviour and the return of the ant in each of m episodes.
 
-    Behaviours are indices into `BEHAVIOURS`, int8 (m,); returns are int64 (m,). An episode without
-    a delivery has `max_steps` steps.
+    Args:
+        trace: The trace of a `rollout`, or of several episodes.
+        max_steps: The step limit, which episodes without a delivery reach.
+
+    Returns:
+        Behaviours, indices into `BEHAVIOURS`, int8 (m,); undiscounted returns, int64 (m,).
+
+    >>> behaviours, returns = classify(rollout(worlds.paper(), result.q_values[0, 0]), 600)
+    >>> BEHAVIOURS[behaviours[0]] in BEHAVIOURS, returns.shape
+    (True, (1,))
     """
     episode = np.asarray(trace.episodes) - trace.episodes[0]
     late = np.asarray(trace.steps) >= max_steps // 2

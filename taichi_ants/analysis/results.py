@@ -193,14 +193,15 @@ def plot(results: Tidy | Mapping[str, Tidy], *measures: str) -> Figure:
         panels[-1].set_xlabel(sentence(across))
         entries = style.legend_entries([panels[0]]) if labels[1:] else {}
         caption = f"{means_in_words(len(first.seeds))}."
-        style.frame(figure, f"Measures by {across}", caption, entries)
+        title = "Measures" if names[1:] else words
+        style.frame(figure, f"{title} by {across}", caption, entries)
     return figure
 
 
 def _tables_of(results: Mapping[str, Tidy]) -> dict[str, Measured]:
     """Return the tables of results by name; AntsError unless all have the same seeds."""
     for name, result in results.items():
-        expect(name, result, Tidy)
+        expect(name or "result", result, Tidy)
     tables = {name: result.measured() for name, result in results.items()}
     first, *others = tables
     for name in others:

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+__all__ = ["bootstrap_interval", "interquartile_mean", "student_interval"]
 RESAMPLES = 40_000
 RANDOM_SEED = 20_250_801
 # Differences of means of integers carry rounding errors of about 1e-15 of their size.
@@ -59,6 +60,9 @@ def interquartile_mean(values: np.ndarray) -> np.ndarray:
     """Return the IQM of values (rows, seeds) over seeds, float64 (rows,), nan for rows with a nan.
 
     It leaves out the lowest and the highest quarter of n seeds, n // 4 each, as in rliable.
+
+    >>> interquartile_mean(np.array([[0, 1, 2, 9]]))
+    array([1.5])
     """
     ordered = np.sort(np.asarray(values, float), axis=1)
     cut = ordered.shape[1] // 4
@@ -134,8 +138,19 @@ def bootstrap_interval(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the bootstrap interval of the mean over seeds (expanded BCa) or the IQM (percentiles).
 
-    Both ends are float64 (rows,), for values (rows, seeds), or (seeds,) for a single row. They are
-    nan for fewer than two seeds and for rows with a nan, and equal if all seeds of a row are.
+    Args:
+        values: float (rows, seeds), or (seeds,) for a single row.
+        level: The probability with which the interval covers the true value, 0 to 1.
+        resamples: The number of resamples of the seeds.
+        iqm: Whether it is the interval of the interquartile mean.
+
+    Returns:
+        The lower and the upper ends, float64 (rows,). They are nan for fewer than two seeds and for
+        rows with a nan, and equal if all seeds of a row are.
+
+    >>> low, high = bootstrap_interval(np.arange(10))
+    >>> low.round(1), high.round(1)
+    (array([2.4]), array([6.6]))
     """
     # Rows often repeat, for example where all runs of two configurations deliver equally often.
     bits = np.ascontiguousarray(np.atleast_2d(np.asarray(values, float))).view(np.int64)
@@ -154,7 +169,14 @@ def bootstrap_interval(
 def student_interval(
     values: np.ndarray, level: float = 0.95, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return Student's t interval of the mean over seeds; with `iqm`, Tukey and McLaughlin's."""
+    """Return Student's t interval of the mean over seeds; with `iqm`, Tukey and McLaughlin's.
+
+    Arguments and results are those of `bootstrap_interval`, but values have two dimensions.
+
+    >>> low, high = student_interval(np.arange(10)[None])
+    >>> low.round(1), high.round(1)
+    (array([2.3]), array([6.7]))
+    """
     from scipy.special import stdtrit
 
     values = np.asarray(values, float)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import XAxis, YAxis
     from matplotlib.figure import Figure
 
+__all__ = ["use"]
 # 9 inches are about 900 pixels, the width of a README; the DPI doubles that for sharp screens.
 WIDTH = 9.0
 DPI = 180
@@ -55,7 +56,11 @@ def label(name: str) -> str:
 
 
 def use() -> None:
-    """Apply the style of the project to all figures of a notebook."""
+    """Apply the style of the project to all figures of a notebook.
+
+    >>> from taichi_ants.analysis import style
+    >>> style.use()
+    """
     from matplotlib import rcParams
 
     rcParams.update({**_settings(), "figure.figsize": (8.0, 3.0), "figure.dpi": 110})

@@ -39,6 +39,12 @@ def low_word(bits):
 
 
 @ti.func
+def joined(low, high):
+    """Return 64 bits from two words, i32."""
+    return low_word(ti.cast(low, ti.u64)) | ti.cast(high, ti.u64) << ti.u64(32)
+
+
+@ti.func
 def below(word, n):
     """Return a whole number in [0, n) from a 32-bit word, as i32 (Lemire 2019, no rejection)."""
     return ti.cast((word * ti.cast(n, ti.u64)) >> ti.u64(32), ti.i32)

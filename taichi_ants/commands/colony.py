@@ -91,7 +91,7 @@ def run(settings: argparse.Namespace) -> None:
     """Run a colony and print a summary; a signal stops it between two ticks."""
     from taichi_ants import Colony
     from taichi_ants.files import check_writable_file
-    from taichi_ants.rendering import check_animation
+    from taichi_ants.rendering.writers import check_animation
 
     load_plugin(settings.plugin)
     files = settings.save, settings.render

@@ -134,9 +134,9 @@ def is_page(settings: argparse.Namespace) -> bool:
 
 def run(settings: argparse.Namespace) -> None:
     """Write the file that the settings describe, and print a summary."""
-    from taichi_ants.rendering import check_animation
     from taichi_ants.rendering.scene import check_size
-    from taichi_ants.viewer import check_page
+    from taichi_ants.rendering.writers import check_animation
+    from taichi_ants.viewer.page import check_page
 
     if is_page(settings):
         check_page(settings.out)
@@ -202,7 +202,8 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
         alone = settings.kind == "episode"
         return policy.q_values, replace(policy.task, life=Life()) if alone else policy.task, title
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
-    title = settings.title or f"{learners.label(config.learner)} after {count(episodes, 'episode')}"
+    learner = learners.registry.label(config.learner)
+    title = settings.title or f"{learner} after {count(episodes, 'episode')}"
     with progress_bar("Training") as progress:
         task = given_task(settings)
         if settings.kind != "colony":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import nullcontext
 from functools import cache
 from itertools import accumulate
@@ -12,11 +12,13 @@ from weakref import finalize, ref
 
 import numpy as np
 import taichi as ti
+from taichi.lang import impl
 from taichi.lang.argpack import ArgPack
 from taichi.types import ndarray_type
 
 from taichi_ants import runtime
 from taichi_ants.arithmetic.guards import guarded
+from taichi_ants.engines.device_memory import copy_in, copy_out, room_for
 from taichi_ants.errors import AntsError
 
 _ARRAYS = np.ndarray, ti.Ndarray
@@ -31,21 +33,29 @@ class Launch:
 
     `kernel_of` returns the kernel for a pack type. Packs contain NumPy arrays, which kernels change
     in place; arrays of `ti.ndarray`; whole numbers, as i32, or u64 for `np.uint64`; and floats, as
-    f32. On a GPU, Taichi copies NumPy arrays at each launch, in both directions, but not those of
-    `ti.ndarray`; and kernels are compiled with the guards of `arithmetic.guards`.
+    f32. For a GPU, kernels are compiled with the guards of `arithmetic.guards`, and each launch
+    copies NumPy arrays to the GPU, except those of `outputs`, and the `changed` ones and `outputs`
+    back.
     """
 
-    def __init__(self, kernel_of: Callable[[Any], Any]) -> None:
-        self._kernel_of = kernel_of
+    def __init__(
+        self,
+        kernel_of: Callable[[Any], Any],
+        changed: Collection[str] = (),
+        outputs: Collection[str] = (),
+    ) -> None:
+        self._kernel_of, self._changed, self._outputs = kernel_of, changed, outputs
+        self._copies: dict[str, Any] = {}  # of NumPy arrays, on a GPU
         self._taichi: Any = lambda: None  # the Taichi runtime for which the launch was prepared
+        self._repeats: Any = self._taichi  # the same, if the launch needs nothing else
         # Not a reference to its program, which would outlive a reset of Taichi.
         self._compiled: Any = None
         self._known: dict[str, Any] = {}  # the present values of the pack and the context
-        self._flushing = runtime.Flushing()
+        self._flushing, self._leaves = runtime.Flushing(), False
 
     def __call__(self, values: Mapping[str, Any]) -> None:
         """Launch with these values; names and types are always the same, arrays C-contiguous."""
-        if self._taichi() is not ti.lang.impl.get_runtime():
+        if self._taichi() is not impl.get_runtime():
             runtime.start()  # the caller may have reset Taichi
             check_not_lost(values.values())
             self._prepare(values)
@@ -55,30 +65,58 @@ class Launch:
         self._launch()
 
     def repeat(self, values: Mapping[str, Any]) -> None:
-        """Launch with the values of the last launch, the same objects, without comparing them."""
-        if self._taichi() is ti.lang.impl.get_runtime():
-            self._launch()
+        """Launch with the values of the last launch, the same objects, without comparing them.
+
+        The kernel must compute with whole numbers only, because subnormal numbers are not flushed.
+        """
+        running = impl.get_runtime()
+        if self._repeats() is running:
+            running.prog.launch_kernel(self._compiled, self._context)
         else:
             self(values)
 
+    def without_outputs(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Launch likewise, but return the outputs as they are on the GPU; none on a CPU."""
+        self._leaves = True
+        try:
+            self(values)
+        finally:
+            self._leaves = False
+        return {name: self._copies.pop(name) for name in self._outputs if name in self._copies}
+
     def _launch(self) -> None:
         if self._renews:
-            # A launch on a GPU replaces the pointers in its context by those of copies, and on a
-            # CPU those of `ti.ndarray`.
+            # A launch on a CPU replaces the pointers of `ti.ndarray` in its context.
             self._context = self._new_context()
             for name, place in self._places.items():
-                _pass(self._context, place, self._known[name])
+                _pass(self._context, place, self._on_device(name))
         with self._flushing:
-            ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
+            impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
+        for name, copy in self._copies.items():
+            if name in self._changed or (name in self._outputs and not self._leaves):
+                copy_out(copy, self._known[name])
+
+    def _on_device(self, name: str) -> Any:
+        """Return an array, or for a GPU a copy on it of one of NumPy."""
+        value = self._known[name]
+        if not (self._for_gpu and isinstance(value, np.ndarray)):
+            return value
+        copy = self._copies.get(name)
+        if copy is None or copy.shape != value.shape:
+            copy = self._copies[name] = room_for(value)
+        if name not in self._outputs:
+            copy_in(value, copy)
+        return copy
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
         """Compile the kernel and make its pack, as Taichi does at a launch."""
-        for_gpu = runtime.compiles_for_gpu()
+        self._for_gpu = for_gpu = runtime.compiles_for_gpu()
+        self._copies = {}
         self._renews = for_gpu or any(isinstance(value, ti.Ndarray) for value in values.values())
         if for_gpu:
             values = {**values, _ZERO: 0}
         kind = _pack_type(tuple((name, *type_of(value)) for name, value in values.items()))
-        taichi = ti.lang.impl.get_runtime()
+        taichi = impl.get_runtime()
         program, kernel = taichi.prog, self._kernel_of(kind)._primal
         # `kind(**values)` would make two packs.
         self._pack = pack = _Pack(kind, dict(values))
@@ -102,6 +140,7 @@ class Launch:
         self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
         self._known = dict.fromkeys(values)
         self._taichi = ref(taichi)
+        self._repeats = self._taichi if not self._renews else lambda: None
 
     def _new_context(self) -> Any:
         """Return a context for launches with the pack, still without the arrays."""
@@ -125,18 +164,9 @@ def has_guards(arguments: Any) -> bool:
     return _ZERO in arguments.members
 
 
-def on_device(array: np.ndarray) -> Any:
-    """Return a copy of an array that stays in the memory of the device between launches."""
-    copy = ti.ndarray(getattr(ti, type_of(array)[0]), array.shape)
-    copy.taichi = ref(ti.lang.impl.get_runtime())
-    with runtime.quiet():
-        copy.from_numpy(array)
-    return copy
-
-
 def check_not_lost(values: Iterable[Any]) -> None:
     """Raise AntsError if Taichi was reset after one of the values came to the device."""
-    running = ti.lang.impl.get_runtime()
+    running = impl.get_runtime()
     if any(getattr(value, "taichi", lambda: running)() is not running for value in values):
         raise AntsError(
             "Taichi was reset, which destroys environments on a GPU; create them again."
@@ -192,7 +222,7 @@ class _Pack(ArgPack):
 
 def _delete(taichi: ref, memory: Any) -> None:
     """Delete the memory of a pack if its Taichi runtime is still active."""
-    running = ti.lang.impl.get_runtime()
+    running = impl.get_runtime()
     program = getattr(running, "prog", None)
     if taichi() is running and program is not None:
         program.delete_argpack(memory)

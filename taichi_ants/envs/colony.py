@@ -15,6 +15,7 @@ from taichi_ants.envs.vector import (
     Ants,
     AntVectorEnv,
     Arguments,
+    RenderMode,
     Rules,
     Step,
     Worlds,
@@ -175,7 +176,12 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         ants: The number of ants in each world.
         task: See `HexForageEnv`; without births and lifespan.
         start, max_steps: See `HexColonyParallelEnv`.
-        others: See `HexForageEnv`; `render` draws each ant's world.
+        world, observation_format, render_mode: See `HexForageEnv`; `render` draws each ant's world.
+
+    >>> ants = gymnasium.make_vec("taichi_ants/HexColony-v0", num_envs=8, ants=4)
+    >>> seen, infos = ants.reset(seed=0)
+    >>> ants.step(np.ones(8, int))[1].shape  # the reward of each ant
+    (8,)
     """
 
     def __init__(
@@ -187,7 +193,7 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         start: str = "nest",
         max_steps: int = MAX_STEPS,
         observation_format: ObservationFormat = "cells",
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
     ) -> None:
         n, ants = checked_whole("num_envs", num_envs), checked_whole("ants", ants)
         if n % ants:

@@ -12,12 +12,13 @@ from pettingzoo.utils.env_logger import EnvLogger
 
 from taichi_ants.envs.colony import MAX_STEPS, ColonyWorlds
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.vector import METADATA, Arguments, Place, Rules
+from taichi_ants.envs.vector import METADATA, Arguments, Place, RenderMode, Rules
 from taichi_ants.errors import shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Life
 from taichi_ants.task.constants import N_ACTIONS
 
+__all__ = ["HexColonyParallelEnv", "parallel_env"]
 Infos = dict[str, dict[str, Any]]  # by agent and name
 
 
@@ -40,12 +41,20 @@ class HexColonyParallelEnv(ParallelEnv):
         capacity: The largest number of living ants; by default, `ants`, or 2 * `ants` + 64 if the
             task has births.
         max_steps: The number of steps of an episode.
-        others: See `HexForageEnv`.
+        world, task, observation_format, render_mode: See `HexForageEnv`.
 
     Attributes:
         possible_agents: All agents that can live in an episode: the ants at the start and those
             that can be born, see `most_births`.
         agents: The living agents, after the first reset.
+
+    >>> from taichi_ants.envs import colony_v0
+    >>> env = colony_v0.parallel_env(ants=4, render_mode="rgb_array")
+    >>> seen, infos = env.reset(seed=0)
+    >>> actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+    >>> seen, rewards, terminated, truncated, infos = env.step(actions)
+    >>> env.observation_space("ant_0").contains(seen["ant_0"]), env.render().shape
+    (True, (720, 1280, 3))
     """
 
     metadata: ClassVar[dict] = {**METADATA, "name": "colony_v0", "is_parallelizable": True}
@@ -59,7 +68,7 @@ class HexColonyParallelEnv(ParallelEnv):
         capacity: int | None = None,
         max_steps: int = MAX_STEPS,
         observation_format: ObservationFormat = "cells",
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
     ) -> None:
         arguments = Arguments(world, task, max_steps, observation_format, render_mode)
         self._worlds = ColonyWorlds(1, arguments, ants, start, capacity)

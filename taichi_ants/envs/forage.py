@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, lru_cache
+from typing import Any, Literal, get_args
 
 import gymnasium
 import numpy as np
@@ -23,6 +24,7 @@ from taichi_ants.envs.vector import (
     AntVectorEnv,
     Arguments,
     Place,
+    RenderMode,
     Rules,
     Step,
     Worlds,
@@ -40,7 +42,8 @@ __all__ = ["HexForageEnv", "HexForageVectorEnv", "Rollout"]
 
 _WHOLE = (int, np.int64)  # the types of most actions
 SUPPORTS = LONE - CHOICE - {"choice.rule=softmax"}  # actions are given
-DELIVERIES = ("terminates", "truncates", "continues")
+Delivery = Literal["terminates", "truncates", "continues"]
+DELIVERIES: tuple[str, ...] = get_args(Delivery)
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
 _NUMBERS_OF_ANT = 24  # at least those in `BatchedEnvironments` beside the cells
@@ -50,6 +53,8 @@ _AFTER_END = {
     AutoresetMode.NEXT_STEP: Command.BEGIN,
     AutoresetMode.DISABLED: Command.WAIT,
 }
+_MASKS = list(ACTION_MASKS)  # faster than a view of a row at each step, like the next function
+_int64 = lru_cache(1 << 16)(np.int64)
 # Each row as a number of 8 bytes, because `take` of numbers is three times as fast.
 _PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64)[:, 0]
 
@@ -63,7 +68,9 @@ class LoneAnts(Ants):
         task = self.task
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
-        most = _MOST_CELLS // (self.worlds[0].grid.size + _NUMBERS_OF_ANT)
+        size = self.worlds[0].grid.size
+        # Kernels read four numbers of each cell of all different worlds.
+        most = (_MOST_CELLS - 4 * size * len(self.worlds)) // (size + _NUMBERS_OF_ANT)
         checked_whole("num_envs", n, 1, most, " for a world of this size")
         self.batched = BatchedEnvironments(
             self.worlds, task, n, self.max_steps, delivery, task.evaporation_in_training
@@ -79,8 +86,8 @@ class LoneAnts(Ants):
         begins = waiting if self.mode is AutoresetMode.NEXT_STEP else 0
         self.batched.step(actions, begins, _AFTER_END[self.mode])
         arrays = self.batched.arrays
-        results = arrays["results"]
-        return arrays["rewards_of"].copy(), results & TERMINATED != 0, results & TRUNCATED != 0
+        results, rewards = arrays["results"], arrays["rewards_of"].astype(np.float64)
+        return rewards, results & TERMINATED != 0, results & TRUNCATED != 0
 
     def over(self) -> np.ndarray:
         return self.batched.arrays["results"] >= TRUNCATED
@@ -145,6 +152,14 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         max_steps: The number of steps after which an episode is truncated.
         observation_format: "cells", "index" or "one_hot".
         render_mode: "rgb_array" for pictures, uint8 (720, 1280, 3), or None.
+
+    >>> env = gymnasium.make("taichi_ants/HexForage-v0", render_mode="rgb_array")
+    >>> seen, info = env.reset(seed=0)
+    >>> seen, reward, terminated, truncated, info = env.step(1)  # forward
+    >>> envs.Event(info["event"]).name, envs.Reason(info["reason"]).name
+    ('ENTERED_CUE', 'NONE')
+    >>> env.unwrapped.action_masks().tolist(), env.render().shape
+    ([True, True, True, False, False], (720, 1280, 3))
     """
 
     metadata = METADATA
@@ -154,10 +169,10 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         self,
         world: Place = "paper",
         task: Rules | None = None,
-        delivery: str | None = None,
+        delivery: Delivery | None = None,
         max_steps: int = EPISODE_STEPS,
         observation_format: ObservationFormat = "cells",
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
     ) -> None:
         arguments = Arguments(world, task, max_steps, observation_format, render_mode)
         self._ants = LoneAnts(1, delivery, arguments)
@@ -177,7 +192,8 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
             seed = int(self.np_random.integers(2**63))
         self._ants.begin(np.ones(1, bool), [seed])
         self._ants.begun = True
-        return self._seen()[:2]
+        observation, *_, info = self._shown(self._ants.batched.alone.tolist())
+        return observation, info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Take an action, 0 to 4.
@@ -191,31 +207,29 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         """
         ants = self._ants
         batched = ants.batched
-        ants.check_begun("step()")
-        if batched.arrays["results"][0] >= TRUNCATED:
+        if batched.alone[2] >= TRUNCATED:  # the result; also before the first episode
+            ants.check_begun("step()")
             raise ResetNeeded("the episode has ended; call reset() before step().")
         known = type(action) in _WHOLE and 0 <= action < N_ACTIONS
         if not known and not self.action_space.contains(action):  # which takes a microsecond
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
-        batched.step(action)
-        observation, info, result = self._seen()
-        reward = float(batched.arrays["rewards_of"][0])
-        return observation, reward, result & TERMINATED != 0, result & TRUNCATED != 0, info
+        return self._shown(batched.step_alone(action))
 
-    def _seen(self) -> tuple[Any, dict[str, Any], int]:
-        """Return the observation, the info and the result of the last step."""
-        ants, whole_number = self._ants, np.int64
-        state, paper_state, result, reason, deliveries = ants.batched.shown[:, 0].tolist()
+    def _shown(self, results: list[int]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Return what `step` returns, by the results of `step_alone`."""
+        state, paper_state, result, reason, deliveries, reward = results
         return (
-            ants.shown.table[state].copy(),
+            self._ants.shown.rows[state].copy(),
+            float(reward),
+            result & TERMINATED != 0,
+            result & TRUNCATED != 0,
             {
-                "state": whole_number(state),
-                "action_mask": ACTION_MASKS[paper_state].copy(),
-                "event": whole_number(result & (TRUNCATED - 1)),
-                "reason": whole_number(reason),
-                "deliveries": whole_number(deliveries),
+                "state": _int64(state),
+                "action_mask": _MASKS[paper_state].copy(),
+                "event": _int64(result & (TRUNCATED - 1)),
+                "reason": _int64(reason),
+                "deliveries": _int64(deliveries),
             },
-            result,
         )
 
     def action_masks(self) -> np.ndarray:
@@ -229,28 +243,80 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         return None if self.render_mode is None else self._ants.draw(0)
 
 
-class Rollout(NamedTuple):
+class Rollout:
     """The results of several steps of n environments; row t of each array is step t.
 
-    Attributes:
-        observations: The observations before each step, and after the last one: (steps + 1, n, ...)
-            of the dtype of the observation space. `observations[1:]` are those that `step` returns.
-        actions: The actions taken, int64 (steps, n).
-        rewards: float64 (steps, n).
-        terminated, truncated: bool (steps, n).
-        events: The results of the actions, codes of `Event` as uint8 (steps, n). `NONE` in steps
-            that only begin an episode, or of environments that wait for a reset.
-        final_observations: The last observation of each episode that ended, (episodes, ...), in
-            the order of `np.argwhere(terminated | truncated)`.
+    On a GPU, an array stays there until you read it. Iteration yields all arrays, in this order.
     """
 
-    observations: np.ndarray
-    actions: np.ndarray
-    rewards: np.ndarray
-    terminated: np.ndarray
-    truncated: np.ndarray
-    events: np.ndarray
-    final_observations: np.ndarray
+    _NAMES = "observations", "actions", "rewards", "terminated", "truncated", "events"
+
+    def __init__(
+        self,
+        seen: np.ndarray,
+        rows: Callable[[str], np.ndarray],
+        shows: Callable[[np.ndarray], np.ndarray] | None,
+    ) -> None:
+        """Take the observations, a function that fills rows, and one that shows final states.
+
+        The latter is None if the observation after each step is the last one of its episode.
+        """
+        self._seen, self._rows, self._shows = seen, rows, shows
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        return (getattr(self, name) for name in (*self._NAMES, "final_observations"))
+
+    def __getstate__(self) -> dict[str, np.ndarray]:
+        """Return all arrays, for copies and pickles."""
+        return dict(zip((*self._NAMES, "final_observations"), self, strict=True))
+
+    @cached_property
+    def observations(self) -> np.ndarray:
+        """The observations before each step and after the last one, (steps + 1, n, ...).
+
+        Their dtype is that of the observation space. `observations[1:]` are those of `step`.
+        """
+        self._rows("seen")
+        return self._seen
+
+    @cached_property
+    def actions(self) -> np.ndarray:
+        """The actions taken, int64 (steps, n)."""
+        return self._rows("taken")
+
+    @cached_property
+    def rewards(self) -> np.ndarray:
+        """The rewards, float64 (steps, n)."""
+        return self._rows("rewards_of")
+
+    @cached_property
+    def terminated(self) -> np.ndarray:
+        """Whether a step terminated the episode, bool (steps, n)."""
+        return self._rows("result_rows") & TERMINATED != 0
+
+    @cached_property
+    def truncated(self) -> np.ndarray:
+        """Whether a step truncated the episode, bool (steps, n)."""
+        return self._rows("result_rows") & TRUNCATED != 0
+
+    @cached_property
+    def events(self) -> np.ndarray:
+        """The results of the actions, codes of `Event` as uint8 (steps, n).
+
+        `NONE` in steps that only begin an episode, or of environments that wait for a reset.
+        """
+        return self._rows("result_rows") & (TRUNCATED - 1)
+
+    @cached_property
+    def final_observations(self) -> np.ndarray:
+        """The last observation of each episode that ended, (episodes, ...).
+
+        They are in the order of `np.argwhere(terminated | truncated)`.
+        """
+        over = self.terminated | self.truncated
+        if self._shows is None:
+            return self.observations[1:][over]
+        return self._shows(self._rows("final_states")[over])
 
 
 class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct bases
@@ -264,7 +330,14 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         world: See `HexForageEnv`; or a list of n worlds with the same ranges, of which environment
             i has entry i modulo n.
         autoreset_mode: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
-        others: See `HexForageEnv`; `render` draws all worlds.
+        task, delivery, max_steps, observation_format, render_mode: See `HexForageEnv`; `render`
+            draws all worlds.
+
+    >>> ants = gymnasium.make_vec("taichi_ants/HexForage-v0", num_envs=4)
+    >>> seen, infos = ants.reset(seed=0)
+    >>> seen, rewards, terminated, truncated, infos = ants.step(np.array([0, 1, 2, 3]))
+    >>> ants.rollout("trail_follower", steps=50).rewards.shape
+    (50, 4)
     """
 
     _ants: LoneAnts
@@ -274,10 +347,10 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         num_envs: int = 1,
         world: Worlds = "paper",
         task: Rules | None = None,
-        delivery: str | None = None,
+        delivery: Delivery | None = None,
         max_steps: int = EPISODE_STEPS,
         observation_format: ObservationFormat = "cells",
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     ) -> None:
         n = checked_whole("num_envs", num_envs)
@@ -317,36 +390,24 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         length, actions, q_values = _checked_plan(policy, steps, n, ants.task)
         epsilon, choices = checked_share("epsilon", epsilon), None
         shape, table = (length, n), ants.shown.table
-        into = Rollout(
-            np.empty((length + 1, n, *table.shape[1:]), table.dtype),
-            np.empty(shape, np.int64) if actions is None else actions,
-            *(np.empty(shape), np.empty(shape, bool), np.empty(shape, bool)),
-            events=np.empty(shape, np.uint8),
-            final_observations=table[:0],
-        )
         if q_values is not None:
             drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
             best = q_values >= q_values.max(axis=1, keepdims=True)
             streams = stream_state(drawn, STREAM_ROLLOUT, np.arange(n))
             choices = best @ (1 << np.arange(N_ACTIONS)), streams, epsilon
-        # Rows that kernels do not write are short, because a GPU copies them nevertheless.
-        finals = np.empty((length, n if ants.mode is AutoresetMode.SAME_STEP else 1), np.int32)
-        into.observations[0] = ants.shown.show(ants.batched.arrays["states"])
+        same_step = ants.mode is AutoresetMode.SAME_STEP
+        seen = np.empty((length + 1, n, *table.shape[1:]), table.dtype)
+        seen[0] = ants.shown.show(ants.batched.arrays["states"])
         rows = {
-            "taken": into.actions,
-            "seen": into.observations[1:],
-            "rewards_of": into.rewards,
-            "result_rows": into.events,
-            "final_states": finals,
+            "taken": np.empty(shape, np.int64) if actions is None else actions,
+            "seen": seen[1:],
+            "rewards_of": np.empty(shape),
+            "result_rows": np.empty(shape, np.uint8),
+            # Kernels write no other rows.
+            "final_states": np.empty((length, n if same_step else 1), np.int32),
         }
-        ants.batched.rollout(rows, table, waiting, _AFTER_END[ants.mode], choices)
-        np.not_equal(into.events & TERMINATED, 0, out=into.terminated)
-        np.not_equal(into.events & TRUNCATED, 0, out=into.truncated)
-        np.bitwise_and(into.events, TRUNCATED - 1, out=into.events)
-        over = into.terminated | into.truncated
-        if ants.mode is AutoresetMode.SAME_STEP:
-            return into._replace(final_observations=ants.shown.show(finals[over]))
-        return into._replace(final_observations=into.observations[1:][over])
+        fetch = ants.batched.rollout(rows, table, waiting, _AFTER_END[ants.mode], choices)
+        return Rollout(seen, fetch, ants.shown.show if same_step else None)
 
 
 def _checked_plan(

@@ -6,7 +6,7 @@ import operator
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from gymnasium.error import InvalidAction, ResetNeeded
@@ -43,6 +43,7 @@ def _action_masks() -> np.ndarray:
 ACTION_MASKS = _action_masks()  # the actions that can succeed, by the paper's state: int8 (128, 5)
 
 
+RenderMode = Literal["rgb_array"]
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 
@@ -264,6 +265,12 @@ class AntVectorEnv(VectorEnv[Any, Any, Any]):
         """Return the world of each environment, as a picture, or None.
 
         Ants that share a world also share its picture.
+
+        >>> name = "taichi_ants/HexForage-v0"
+        >>> ants = gymnasium.make_vec(name, num_envs=2, render_mode="rgb_array")
+        >>> seen, infos = ants.reset(seed=0)
+        >>> len(ants.render())
+        2
         """
         if self.render_mode is None:
             return None

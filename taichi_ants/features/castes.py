@@ -32,6 +32,10 @@ class Caste(Settings, path="task.castes.NAME"):
     Ants of a caste share a table of action values, and can have their own numbers. None means that
     they have those of the task, or of the training. Castes without `share` and `ants` divide the
     remaining share equally. `threshold` can also be a number, which is a fixed threshold.
+
+    >>> castes = {"scouts": {"share": 0.25, "epsilon": 0.5}, "others": {}}
+    >>> Task(castes=castes).castes["scouts"].epsilon
+    0.5
     """
 
     sentences: ClassVar[dict[str, str]] = {

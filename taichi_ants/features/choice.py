@@ -28,6 +28,9 @@ class Choice(Settings, path="task.choice"):
     Only colonies support "deneubourg", which needs no action values, and the names of your rules,
     see `taichi_ants.rules`. "deneubourg" compares levels of the outbound cue; for ants with food,
     those of `carriers_follow` or a homing pheromone.
+
+    >>> Task(choice="softmax").choice.temperature
+    1.0
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -67,7 +70,11 @@ class Choice(Settings, path="task.choice"):
 
     @classmethod
     def named(cls) -> Mapping[str, Choice]:
-        """Return the named values: "greedy", "softmax", "deneubourg", and your rules."""
+        """Return the named values: "greedy", "softmax", "deneubourg", and your rules.
+
+        >>> sorted(task.Choice.named())
+        ['deneubourg', 'greedy', 'softmax']
+        """
         return {rule: cls(rule) for rule in words("choice")}
 
     @property

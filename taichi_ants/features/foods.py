@@ -30,6 +30,9 @@ class Food(Settings, path="task.foods.NAME"):
 
     A cell with food has a number of loads, of which an ant takes one. The cell is food until its
     last load is taken; `regrowth` ticks later, it has all its loads again.
+
+    >>> Task(foods={"seeds": {"deliver": 5, "loads": 3}}).foods["seeds"].loads
+    3
     """
 
     sentences: ClassVar[dict[str, str]] = {

@@ -42,7 +42,11 @@ _NONE, _FIXED, _UNIFORM, _NORMAL, _LOGNORMAL = range(len(DISTRIBUTIONS))
 
 @dataclass(frozen=True)
 class Labour(Settings, path="task.labour"):
-    """The rule by which ants start and stop foraging; by default, they always forage."""
+    """The rule by which ants start and stop foraging; by default, they always forage.
+
+    >>> Task(labour="thresholds", castes={"all": {"threshold": 5}}).labour.demand
+    1.0
+    """
 
     sentences: ClassVar[dict[str, str]] = {
         "rule=thresholds": "Each nest has a stimulus s, which is 0 at the start of an episode, "
@@ -71,13 +75,21 @@ class Labour(Settings, path="task.labour"):
 
     @classmethod
     def named(cls) -> Mapping[str, Labour]:
-        """Return the named values: "none" and "thresholds"."""
+        """Return the named values: "none" and "thresholds".
+
+        >>> sorted(task.Labour.named())
+        ['none', 'thresholds']
+        """
         return {rule: cls(rule) for rule in get_args(LabourRule)}
 
 
 @dataclass(frozen=True)
 class Threshold(Settings, path="task.castes.NAME.threshold"):
-    """The distribution of the response thresholds of a caste, by default none; see the module."""
+    """The distribution of the response thresholds of a caste, by default none.
+
+    >>> task.Caste(threshold=5).threshold.distribution
+    'fixed'
+    """
 
     distribution: Annotated[
         Distribution, Setting("distribution of the thresholds; none: the ants always forage")
@@ -111,7 +123,11 @@ class Threshold(Settings, path="task.castes.NAME.threshold"):
 
     @classmethod
     def named(cls) -> Mapping[str, Threshold]:
-        """Return the named values, one for each distribution."""
+        """Return the named values, one for each distribution.
+
+        >>> task.Threshold.named()["uniform"].spread
+        1.0
+        """
         return {name: cls(name) for name in DISTRIBUTIONS}  # type: ignore[arg-type]
 
     @property
@@ -143,7 +159,7 @@ def _foraging(snapshot: Any) -> float:
 LABOUR = Feature(
     Labour,
     arrays=(
-        Array("idle", ANT, "i1", "idle", "bool", "idle", "yes, no"),
+        Array("idle", ANT, "i1", "idle", "bool", "idle", "yes, no", doc="Whether the ant is idle"),
         Array("threshold", ANT, "f4", "thresholds", "f4", "response threshold", unit=_UNIT),
         Array("stimulus", NEST, "f8", "stimuli", "f8", "stimulus", unit=_UNIT),
     ),

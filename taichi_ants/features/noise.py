@@ -25,6 +25,9 @@ class Noise(Settings, path="task.noise"):
     the action that it chose. Learners learn about the chosen action. With probability `misread`, an
     ant sees a cell in view as another of the four codes, drawn uniformly. This changes the state
     index by which ants choose and learn, but not the results and rewards of actions.
+
+    >>> Task(noise=task.Noise(slip=0.1)).noise.slip
+    0.1
     """
 
     sentences: ClassVar[dict[str, str]] = {

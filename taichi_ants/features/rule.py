@@ -107,7 +107,11 @@ def registered(kind: str, name: str) -> Rule | None:
 
 
 def names(kind: str | None = None) -> tuple[str, ...]:
-    """Return the names of rules, of one kind or of all: built-in functions, then yours."""
+    """Return the names of rules, of one kind or of all: built-in functions, then yours.
+
+    >>> rules.names("deposit")
+    ()
+    """
     return tuple(name for name in RULES.names() if kind in (None, get(name).kind))
 
 

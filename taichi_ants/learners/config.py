@@ -95,17 +95,25 @@ class TrainingConfig(Settings, path="training"):
 
     @classmethod
     def from_dict(cls, facts: Any) -> TrainingConfig:
-        """Return the configuration in a mapping, which can have hyperparameters, too."""
+        """Return the configuration in a mapping, which can have hyperparameters, too.
+
+        >>> TrainingConfig.from_dict(config.as_dict()) == config
+        True
+        """
         return cls(**{**cls._required(facts), **facts})
 
     @classmethod
     def frozen(cls, epsilon: float = 0.0) -> TrainingConfig:
-        """Return the settings of ants that explore with a constant epsilon, and do not learn."""
+        """Return the settings of ants that explore with a constant epsilon, and do not learn.
+
+        >>> TrainingConfig.frozen(epsilon=0.1).epsilon
+        0.1
+        """
         return cls("q_learning", 1.0, 1.0, epsilon, 1.0)
 
     @property
     def least_epsilon(self) -> float:
-        """The epsilon at which decay ends: the smaller of `min_epsilon` and `epsilon`."""
+        """The epsilon at which decay ends, the smaller of `min_epsilon` and `epsilon`."""
         return min(self.min_epsilon, self.epsilon)
 
     @property
@@ -114,7 +122,11 @@ class TrainingConfig(Settings, path="training"):
         return min(self.min_learning_rate, self.learning_rate)
 
     def replace(self, /, **changes: Any) -> TrainingConfig:
-        """Return the configuration with changes; a new learner starts without hyperparameters."""
+        """Return the configuration with changes; a new learner starts without hyperparameters.
+
+        >>> config.replace(learner="q_learning").learner
+        'q_learning'
+        """
         common = [setting.name for setting in declared(TrainingConfig)]
         more = {name: value for name, value in changes.items() if name not in common}
         same = changes.get("learner", self.learner) == self.learner
@@ -132,7 +144,7 @@ class TrainingConfig(Settings, path="training"):
 
     @property
     def planning_steps(self) -> int:
-        """The hyperparameter of this name, or 0: updates from a model after each step."""
+        """The number of updates from a model after each step, which is a hyperparameter; else 0."""
         return int(dict(self.hyperparameters).get("planning_steps", 0))
 
     def as_dict(self) -> dict[str, Any]:
@@ -146,6 +158,12 @@ class Hyperparameters(Settings, path="training"):
 
     Declare each field as `Annotated[int, Setting(...)]` or `Annotated[float, Setting(...)]`; in
     kernels it is i32 or f32.
+
+    >>> @dataclass(frozen=True)
+    ... class Traces(learners.Hyperparameters):
+    ...     trace_decay: Annotated[float, learners.Setting("lambda", least=0, most=1)] = 0.9
+    >>> Traces(0.5).trace_decay
+    0.5
     """
 
     def __post_init__(self) -> None:

@@ -1,4 +1,8 @@
-"""Double Q-learning (van Hasselt 2010): one table selects the best action, the other rates it."""
+"""Double Q-learning (van Hasselt 2010): one table selects the best action, the other rates it.
+
+The target is `r + discount * B(s', argmax A(s', .))`, towards which A(s, a) moves. Each step draws
+which of the two tables is A; the other is B. The ant acts by their mean.
+"""
 
 from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word
 from taichi_ants.kernel_functions import ti

@@ -1,4 +1,8 @@
-"""Dyna-Q (Sutton 1990): Q-learning with additional updates from a model of the world."""
+"""Dyna-Q (Sutton 1990): Q-learning with additional updates from a model of the world.
+
+After the update of Q-learning, `planning_steps` pairs are drawn from the model, which holds the
+last outcome of each visited pair, and updated in the same way.
+"""
 
 from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word
 from taichi_ants.kernel_functions import kernel_function

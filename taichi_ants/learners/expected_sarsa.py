@@ -1,4 +1,7 @@
-"""Expected SARSA (van Seijen et al. 2009): bootstraps from the mean over the policy's actions."""
+"""Expected SARSA (van Seijen et al. 2009): bootstraps from the mean over the policy's actions.
+
+The target is `r + discount * E Q(s', .)`, the expectation under the epsilon-greedy policy.
+"""
 
 from taichi_ants.kernel_functions import ti
 from taichi_ants.learners.learner import td_learner

@@ -17,6 +17,9 @@ class Memory:
 
     Additional `tables` of action values start as copies of that table. The f32 `floats` and the i32
     `integers` start as 0.
+
+    >>> learners.get("double_q").memory(None, 128)
+    Memory(tables=2, floats=0, integers=0)
     """
 
     tables: int = 0
@@ -49,6 +52,17 @@ class Learner:
         cost: A function (hyperparameters) -> float: the time of one step, relative to Q-learning.
             It determines the length of kernel launches.
         summary: A line for listings.
+
+    >>> from taichi_ants.learners.memory import discount_of, values_of
+    >>> def learn(memory, at, step, rates, random_state):  # Q-learning
+    ...     entry = at.table + step.state * 8 + step.action
+    ...     best = values_of(memory.q, at.table, step.next_state).max()
+    ...     target = step.reward + discount_of(rates, step.terminated) * best
+    ...     error = target - memory.q[entry]
+    ...     memory.q[entry] = memory.q[entry] + rates.learning_rate * error
+    ...     return error, random_state
+    >>> learners.register(learners.Learner("mine", learn)).name
+    'mine'
     """
 
     name: str
@@ -101,6 +115,11 @@ def td_learner(
             terminated; `next_values` is the vector of the five action values of the next state.
             `next_action` is i32, all others are f32; it is 0 if the step terminated, and allowed
             only with `draws_next_action`. To try your learner, run `taichi-ants check FILE`.
+
+    >>> def td_error(value, reward, discount, next_values, next_action, epsilon):
+    ...     return reward + discount * next_values.max() - value
+    >>> learners.td_learner("my_q_learning", td_error).draws_next_action
+    False
     """
     from taichi_ants.learners.memory import learn_by  # here, because it imports Taichi
 

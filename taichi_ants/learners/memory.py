@@ -12,6 +12,8 @@ from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.settings import declared
 from taichi_ants.task.constants import N_ACTIONS, ROW
 
+__all__ = ["At", "LearnerArrays", "Transition", "discount_of", "values_of"]
+
 
 class LearnerArrays(NamedTuple):
     """The memory of many runs or ants, one after the other.

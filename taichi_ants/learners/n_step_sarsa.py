@@ -1,4 +1,8 @@
-"""N-step SARSA (Sutton and Barto, chapter 7): targets of n rewards and the value after them."""
+"""N-step SARSA (Sutton and Barto, chapter 7): targets of n rewards and the value after them.
+
+The target of the pair of n steps ago is `r1 + discount * r2 + ... + discount^n * Q(s', a')`, where
+n is `n_steps`, and a' is the next action, drawn before the update.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated

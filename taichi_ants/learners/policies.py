@@ -23,6 +23,10 @@ from taichi_ants.task import Choice, Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
 
+__all__ = [
+    "Policy", "action_probabilities", "frozen_policy", "load_policy", "random_policy",
+    "save_policy", "trail_follower",
+]  # fmt: skip
 ActionValues = npt.NDArray[np.float32]
 _KIND = Kind("policy", 2, "save_policy", most=1 << 26)
 
@@ -46,18 +50,31 @@ class Policy(NamedTuple):
 
 
 def random_policy(observation: str = "paper") -> ActionValues:
-    """Return the policy that takes each of the five actions with equal probability."""
+    """Return the policy for an observation that takes all five actions with equal probability.
+
+    >>> random_policy().shape
+    (128, 5)
+    """
     return np.zeros((observations.get(observation).n_states, N_ACTIONS), np.float32)
 
 
 def action_probabilities(
     q_values: np.ndarray, epsilon: float = 0.0, choice: Choice | None = None
 ) -> np.ndarray:
-    """Return the probabilities of actions, float64 (..., 5); by default of epsilon-greedy ones.
+    """Return the probabilities of actions, float64 (..., 5), in states with given action values.
+
+    Args:
+        q_values: float (..., 5), action values.
+        epsilon: The exploration rate, 0 to 1.
+        choice: The rule of choice; None for epsilon-greedy ants.
 
     Epsilon-greedy probabilities are exactly as in kernels. Probabilities of the rule "softmax" can
     differ from those in kernels by rounding.
+
+    >>> action_probabilities(np.array([0, 1, 1, 0, 0]), epsilon=0.5).tolist()
+    [0.1, 0.35, 0.35, 0.1, 0.1]
     """
+    q_values = np.asarray(q_values)
     explores = np.floor(epsilon * 2.0**32) / 2.0**32
     if choice is not None and (weights := choice.weights(q_values)) is not None:
         shares = weights / weights.sum(axis=-1, keepdims=True)
@@ -101,6 +118,9 @@ def trail_follower(observation: str = "paper") -> ActionValues:
     until that ant pushes it along the trail. With the observation `queues`, it moves against that
     ant instead of waiting, and waits behind an ant that is further up the trail (p). Only the
     observations in `FOLLOWED` have rules.
+
+    >>> trail_follower("ants").shape
+    (432, 5)
     """
     check_one_of("observation", observation, FOLLOWED)
     name_of, q_values = observations.get(observation).name_of, random_policy(observation)
@@ -138,10 +158,16 @@ def frozen_policy(
 ) -> ActionValues:
     """Return a policy without learning by its name, or the policy in a file (.npz).
 
-    Messages call it `name`.
+    Args:
+        name_or_path: "trail_follower", "random", or the path of a file.
+        observation: The name of the observation of the ants that follow it.
+        name: The name of the argument in messages.
 
     Raises:
         AntsError: There is no such policy for this observation, or the file cannot be used.
+
+    >>> (frozen_policy("trail_follower", "ants") == trail_follower("ants")).all().item()
+    True
     """
     expect(name, name_or_path, str, os.PathLike)
     name_or_path = os.fspath(name_or_path)

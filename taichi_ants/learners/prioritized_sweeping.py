@@ -1,4 +1,9 @@
-"""Prioritized sweeping (Moore and Atkeson 1993): planning starts with the largest error."""
+"""Prioritized sweeping (Moore and Atkeson 1993): planning starts with the largest error.
+
+Each step sets the priority of its pair to the absolute TD error of Q-learning, if that exceeds
+`threshold`. Then up to `planning_steps` pairs of highest priority are updated from the model, and
+the pairs that lead to them get new priorities.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated

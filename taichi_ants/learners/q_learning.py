@@ -1,4 +1,7 @@
-"""Q-learning (Watkins 1989): off-policy, bootstraps from the best next action."""
+"""Q-learning (Watkins 1989): off-policy, bootstraps from the best next action.
+
+The target of an update is `r + discount * max Q(s', .)`.
+"""
 
 from taichi_ants.learners.learner import td_learner
 from taichi_ants.task.rules.policy import best_value

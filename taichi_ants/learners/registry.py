@@ -43,6 +43,9 @@ def register(learner: Learner) -> Learner:
     Existing results, colonies and kernels do not change. `taichi-ants check FILE` tries the
     functions of your learners. Raises AntsError if the name is not an identifier or belongs to a
     built-in learner, or a field does not have the form that `Learner` describes.
+
+    >>> learners.register(replace(learners.get("sarsa"), name="my_sarsa")).name
+    'my_sarsa'
     """
     expect("learner", learner, Learner)
     name = learner.name

@@ -1,4 +1,7 @@
-"""SARSA (Rummery and Niranjan 1994): on-policy, bootstraps from the next action."""
+"""SARSA (Rummery and Niranjan 1994): on-policy, bootstraps from the next action.
+
+The target is `r + discount * Q(s', a')`. The ant draws a' before the update, and then takes it.
+"""
 
 from taichi_ants.learners.learner import td_learner
 from taichi_ants.task.rules.policy import value_at

@@ -1,4 +1,8 @@
-"""SARSA(lambda) with a short list of replacing traces (Singh and Sutton 1996)."""
+"""SARSA(lambda) with a short list of replacing traces (Singh and Sutton 1996).
+
+The error of SARSA also changes earlier pairs, in proportion to their traces. A trace is 1 after a
+visit, and fades by `discount * trace_decay` in each step; the last `trace_length` pairs have one.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated

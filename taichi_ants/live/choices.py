@@ -68,7 +68,7 @@ def fields() -> Iterator[dict[str, Any]]:
         for setting in declared(learners.get(name).hyperparameters):
             yield {**_field(setting), "learner": name}
     for name in WORLDS.keys() - {"map"}:
-        for setting in worlds.settings_of(name):
+        for setting in worlds.registry.settings_of(name):
             if setting.name != "ranges":
                 yield {**_field(setting), "world": name}
 
@@ -111,14 +111,14 @@ class Choices:
             "settings": list(fields()),
             "sees": {name: observations.get(name).summary for name in observations.names()},
             "learners": {
-                name: {"words": learners.label(name), "summary": learners.get(name).summary}
-                for name in learners.names()
+                one: {"words": learners.registry.label(one), "summary": learners.get(one).summary}
+                for one in learners.names()
             },
             "by_hand": list(FOLLOWED),
             "policies": {
                 name: flat(policy.task.as_dict(), "task") for name, policy in self.policies.items()
             },
-            "drawn": [name for name in WORLDS if worlds.is_drawn(name)],
+            "drawn": [name for name in WORLDS if worlds.registry.is_drawn(name)],
             "sizes": SIZES,
             "most": {"ants": MOST_ANTS, "text": MOST_TEXT},
         }
@@ -165,7 +165,7 @@ class Choices:
         size = checked_whole("the size", chosen["size"], *SIZES)
         shares = table is not None or learners.get(name).td_error is not None
         training = {**_LEARNING, **settings.get("training", {})}
-        ranges = {"ranges": [size] * 3} if worlds.is_drawn(world) else {}
+        ranges = {"ranges": [size] * 3} if worlds.registry.is_drawn(world) else {}
         return Setup(
             world=named,
             task=task,

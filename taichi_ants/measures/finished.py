@@ -47,6 +47,10 @@ class Run:
             colonies also have moves and blocked.
         ants: The number of ants at the start.
         ticks: The length of the rollouts of a colony; None for lone ants.
+
+    >>> successes = measures.register(
+    ...     "successes", lambda run: (run.evaluation["deliveries"] > 0).mean(axis=-1), of="run"
+    ... )
     """
 
     training: Counts

@@ -34,6 +34,9 @@ class Measure:
             arrays of episodes in finished runs, so the measure works for lone ants, too. "run": a
             `Run`; the value is then float64 (...) with the number of each run.
         episodes: The fewest episodes of training that a measure of a run needs.
+
+    >>> measures.get("deliveries").read(colony.snapshot())
+    {'deliveries': 0.0}
     """
 
     name: str
@@ -77,7 +80,7 @@ class Measure:
         return next(iter(numbers.values()))
 
     def read(self, snapshot: Any) -> dict[str, float]:
-        """Return the value in a state, or its parts, by their full names.
+        """Return the value in a snapshot of a world, or its parts, by their full names.
 
         Raises:
             AntsError: The function fails or returns something else, or the part does not exist.
@@ -157,6 +160,9 @@ def get(name: str | Measure) -> Measure:
 
     Call it with a snapshot to get one number: `get("deliveries")(colony.snapshot())`. A `Measure`
     is returned as it is. Raises AntsError, with a list of all names, if there is none.
+
+    >>> measures.get("deliveries")(colony.snapshot()), measures.get("entropy").unit
+    (0.0, '')
     """
     if isinstance(name, Measure):
         return name

@@ -52,6 +52,9 @@ class Tidy:
         """Yield tidy rows: columns such as world, seed, episode and tick, then measure and value.
 
         They are ordered by measure. A value that does not exist is nan.
+
+        >>> [*next(result.rows())]
+        ['configuration', 'seed', 'episode', 'tick', 'measure', 'value']
         """
         columns = self.columns()
         for row in zip(*(array.tolist() for array in columns.values()), strict=True):
@@ -67,12 +70,19 @@ class Tidy:
         return columns
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the tidy rows as a `pandas.DataFrame`; AntsError if pandas is not installed."""
+        """Return the tidy rows as a `pandas.DataFrame`; AntsError if pandas is not installed.
+
+        >>> result.to_pandas().groupby("measure", observed=True)["value"].mean().index.tolist()
+        ['deliveries', 'efficiency', 'first_delivery', 'returns', 'steps']
+        """
         table = imported("to_pandas", "pandas", "pandas")
         return table.DataFrame(self.columns()).astype({"measure": "category"})
 
     def to_csv(self, path: files.PathLike) -> None:
-        """Write the tidy rows to a file of comma-separated values, with an empty field for nan."""
+        """Write the tidy rows to a file of comma-separated values, with an empty field for nan.
+
+        >>> result.to_csv("result.csv")
+        """
         files.write_csv(path, self.rows(), [*self.measured().index, "measure", "value"])
 
 

@@ -72,6 +72,10 @@ def importance_sampling(
 
     Raises:
         AntsError: An argument is not allowed, or the data have no behaviour probabilities.
+
+    >>> found = offline.importance_sampling(data, random_policy(), epsilon=1.0, resamples=20)
+    >>> bool(found.low <= found.value <= found.high)
+    True
     """
     expect("data", data, Dataset)
     if np.isnan(data.behaviour_probability).any():
@@ -114,8 +118,14 @@ def model_based(
 
     This is the direct method (Jiang and Li, Doubly robust off-policy value evaluation for
     reinforcement learning, ICML 2016). Its variance is small, but it is biased for any amount of
-    data if states are not Markov. Each resample has a separate model. Pairs of state and action
-    without data have the value `initial_q`. Other arguments are those of `importance_sampling`.
+    data if states are not Markov. Each resample has a separate model.
+
+    Args:
+        initial_q: The value of pairs of state and action without data.
+        data, q_values, discount, epsilon, resamples, level: As in `importance_sampling`.
+
+    >>> bool(np.isfinite(offline.model_based(data, result.q_values[0, 0], resamples=0).value))
+    True
     """
     expect("data", data, Dataset)
     times = _times(data, resamples)

@@ -22,27 +22,33 @@ from taichi_ants.offline.dataset import Dataset
 from taichi_ants.settings import Count, Flag, Setting, Share, checked_arguments
 from taichi_ants.task.constants import N_ACTIONS, Event
 
+_LATER = Setting("factor by which later rewards count less, per step")
 # Below 1, so that values of endless episodes are finite; at 0.9999 Q iteration takes half a second.
-Discount = Annotated[Share, Setting(most=0.9999)]
+Discount = Annotated[Share, _LATER, Setting(most=0.9999)]
+ByRun = Annotated[Flag, Setting("return a table for each run of the data")]
 
 
 @checked_arguments
 def batch_q_learning(
     data: Dataset,
-    discount: Share = 0.9,
-    learning_rate: Share = 0.1,
-    sweeps: Count = 100,
+    discount: Annotated[Share, _LATER] = 0.9,
+    learning_rate: Annotated[Share, Setting("share of the error by which a value changes")] = 0.1,
+    sweeps: Annotated[Count, Setting("number of passes over the data")] = 100,
     initial_q: InitialValue = 0.0,
-    by_run: Flag = False,
+    by_run: ByRun = False,
 ) -> np.ndarray:
     """Return action values learned by Q-learning in repeated sweeps over the data, in their order.
 
     This is experience replay (Lin, Self-improving reactive agents, Machine Learning 8, 1992). The
     last transitions of a sweep count most, less so with a small learning rate. Pairs of state and
-    action without data keep `initial_q`. With `by_run`, there is one table per run.
+    action without data keep `initial_q`. The values are float32 (n_states, 5), or, with `by_run`,
+    (runs, n_states, 5).
 
     Raises:
         AntsError: An argument is not allowed.
+
+    >>> offline.batch_q_learning(data, sweeps=5).shape
+    (128, 5)
     """
     expect("data", data, Dataset)
     runs = np.arange(len(data.seeds) + 1) if by_run else [0, len(data.seeds)]
@@ -60,14 +66,17 @@ def batch_q_learning(
 
 @checked_arguments
 def fitted_q_iteration(
-    data: Dataset, discount: Discount = 0.9, initial_q: InitialValue = 0.0, by_run: Flag = False
+    data: Dataset, discount: Discount = 0.9, initial_q: InitialValue = 0.0, by_run: ByRun = False
 ) -> np.ndarray:
     """Return the optimal action values of the empirical model of the data, see `EmpiricalModel`.
 
     This is fitted Q iteration (Ernst, Geurts and Wehenkel, Tree-based batch mode reinforcement
     learning, JMLR 6, 2005) with a table as regression, which fits the mean target of each pair of
     state and action. The order of the data does not matter. Pairs without data keep `initial_q`.
-    Arguments and errors are those of `batch_q_learning`; the discount must be at most 0.9999.
+    Shapes and errors are those of `batch_q_learning`.
+
+    >>> offline.fitted_q_iteration(data).argmax(axis=-1).shape  # the best action in each state
+    (128,)
     """
     model = _model(data, by_run)
     q = model.solve(discount, model.rewards, initial_q)
@@ -78,8 +87,10 @@ def fitted_q_iteration(
 def pessimistic_q_iteration(
     data: Dataset,
     discount: Discount = 0.9,
-    penalty: Annotated[float, Setting(least=0, most=1e9)] = 1.0,
-    by_run: Flag = False,
+    penalty: Annotated[
+        float, Setting("amount for a single transition", unit="units of reward", least=0, most=1e9)
+    ] = 1.0,
+    by_run: ByRun = False,
 ) -> np.ndarray:
     """Return pessimistic action values, which are lower the fewer data a pair has.
 
@@ -87,10 +98,11 @@ def pessimistic_q_iteration(
     Bridging offline reinforcement learning and imitation learning, NeurIPS 2021). It differs from
     `fitted_q_iteration` in that it subtracts penalty / sqrt(n) from the mean reward of a pair with
     n transitions. Pairs without data have the value of the worst reward forever, the lowest value.
+    Shapes and errors are those of `batch_q_learning`.
 
-    Args:
-        penalty: From 0 to 1e9, in units of reward. Other arguments and errors are those of
-            `fitted_q_iteration`.
+    >>> cautious, hopeful = offline.pessimistic_q_iteration(data), offline.fitted_q_iteration(data)
+    >>> (cautious <= hopeful + 1e-4).all().item()
+    True
     """
     model = _model(data, by_run)
     worst = data.task.rewards.by_event()[Event.ENTERED_EMPTY :].min()
@@ -107,13 +119,20 @@ class EmpiricalModel:
     If states are not Markov, the model depends on the behaviour policy too.
 
     Attributes:
+        n_states: The number of states.
         largest: The largest absolute reward of the task.
         groups: int32 (groups + 1,), the index of the first pair of each group, then of the end.
         pairs: int32 (pairs,), state * 5 + action, ascending in a group.
-        counts, rewards: int64, float64 (pairs,), numbers of transitions and their mean rewards.
+        counts: int64 (pairs,), numbers of transitions.
+        rewards: float64 (pairs,), their mean rewards.
         begins: int32 (pairs + 1,), the index of the first successor of each pair, then of the end.
         successors: int32 (k,), states, ascending in a pair; none for transitions that terminated.
         probabilities: float64 (k,); for a pair that may terminate, their sum is less than 1.
+
+    >>> every_episode = np.ones((1, len(data.begins) - 1), int)
+    >>> model = offline.EmpiricalModel.of(data, every_episode)
+    >>> model.solve(0.9, model.rewards, initial_q=0.0).shape
+    (1, 128, 5)
     """
 
     n_states: int
@@ -128,7 +147,10 @@ class EmpiricalModel:
 
     @classmethod
     def of(cls, data: Dataset, times: np.ndarray) -> EmpiricalModel:
-        """Return the model of groups of episodes: `times` (groups, episodes) counts them."""
+        """Return the model of each group of episodes of the data.
+
+        `times`, integers (groups, episodes), says how often a group has an episode.
+        """
         n_states, size = data.task.n_states, data.task.n_states * N_ACTIONS
         pair = data.state.astype(np.int64) * N_ACTIONS + data.action
         # A pair of state and action, and its next state; n_states means that the step terminated.
@@ -169,9 +191,12 @@ class EmpiricalModel:
     ) -> np.ndarray:
         """Return converged action values, float64 (groups, n_states, 5).
 
-        `rewards` are the expected rewards of the pairs. `initial_q` is the initial value, which
-        pairs without data keep, and `lowest` a lower bound of all values. `policy` are action
-        probabilities (n_states, 5); None means the greedy policy.
+        Args:
+            discount: The discount factor, below 1.
+            rewards: float64 (pairs,), the expected rewards of the pairs.
+            initial_q: The value that pairs without data keep.
+            policy: float (n_states, 5), the probabilities of actions; None for the greedy policy.
+            lowest: A lower bound of all values.
         """
         n_groups = len(self.groups) - 1
         q = np.full((n_groups, self.n_states, N_ACTIONS), initial_q, np.float64)

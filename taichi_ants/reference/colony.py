@@ -52,6 +52,13 @@ class ReferenceColony:
 
     The arguments are those of `Colony`, which checks them. If ants have independent tables, a
     newborn ant starts with the initial value, not with `q_values`.
+
+    >>> plain = reference.ReferenceColony(worlds.paper(), Task(), config, seed=0)
+    >>> plain.begin_episode()
+    >>> plain.tick()
+    >>> plain.end_episode()
+    >>> plain.q_values.shape
+    (128, 5)
     """
 
     def __init__(

@@ -9,10 +9,10 @@
 from taichi_ants.records import Snapshot
 from taichi_ants.rendering.scene import Scene, Status
 from taichi_ants.rendering.snapshots import Episode, at_start, colony_snapshots, frames, picture
-from taichi_ants.rendering.writers import PAUSE, check_animation, save_animation, save_picture
+from taichi_ants.rendering.writers import PAUSE, save_animation, save_picture
 
 __all__ = [
-    "PAUSE", "Episode", "Scene", "Snapshot", "Status", "at_start", "check_animation",
-    "colony_snapshots", "frames", "picture", "save_animation", "save_picture",
+    "PAUSE", "Episode", "Scene", "Snapshot", "Status", "at_start", "colony_snapshots", "frames",
+    "picture", "save_animation", "save_picture",
 ]  # fmt: skip
 __dir__ = __all__.copy  # completion lists only public names

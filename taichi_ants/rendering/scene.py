@@ -69,14 +69,23 @@ def name_parts(observation: Observation, state: int) -> tuple[str, str, list[str
 
 @dataclass(frozen=True, eq=False)
 class Status:
-    """Text for the panel of a snapshot, with the state of ant number 0 and its action values."""
+    """Text for the panel of a snapshot, with the state of ant number 0 and its action values.
 
-    lines: tuple[tuple[str, str], ...]  # names and values, for example ("step", "12")
+    Attributes:
+        lines: Names and values, for example ("step", "12").
+        state: The index of the state; None if there is none to show.
+        q_values: float (5,), the action values in the state; None draws no bars.
+        action: The chosen action, 0 to 4.
+        q_range: The scale of the bars, from at most 0 to above 0.
+        observation: The observation that encodes the state.
+    """
+
+    lines: tuple[tuple[str, str], ...]
     state: int | None = None
-    q_values: np.ndarray | None = None  # float (5,), of the state; None draws no bars
-    action: int | None = None  # the chosen action, 0 to 4
-    q_range: tuple[float, float] = (0.0, 1.0)  # the scale of the bars, from at most 0 to above 0
-    observation: Observation = _PAPER  # the observation that encodes the state
+    q_values: np.ndarray | None = None
+    action: int | None = None
+    q_range: tuple[float, float] = (0.0, 1.0)
+    observation: Observation = _PAPER
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -105,6 +114,11 @@ class Scene:
 
     Raises:
         AntsError: An argument is of the wrong kind, or the size is not allowed.
+
+    >>> snapshot = rendering.at_start(worlds.paper())
+    >>> scene = rendering.Scene(snapshot.grid, size=(640, 360), title="The paper's world")
+    >>> scene.draw(snapshot, rendering.Status([("step", "0")])).shape
+    (360, 640, 3)
     """
 
     def __init__(
@@ -143,6 +157,8 @@ class Scene:
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """Return the picture of a snapshot and its panel, uint8 (height, width, 3).
+
+        The panel shows the text of `status`, if one is given.
 
         Raises:
             AntsError: An argument is of the wrong kind, or the snapshot has another grid.

@@ -28,7 +28,14 @@ CaptionedSnapshot = tuple[Snapshot, Status]
 
 
 def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
-    """Return a world with n ants, or none, at the start; raises as `World.start` does."""
+    """Return a snapshot of a world at the start, with n ants or none, placed by the seed.
+
+    Raises as `World.start` does.
+
+    >>> rendering.at_start(worlds.paper(), n=3).ant_cells.shape
+    (3,)
+    """
+    expect("world", world, World)
     cells, headings = world.start(seed, n) if n else np.zeros((2, 0), np.int32)
     return Snapshot(
         *(world.grid, world.ground(), world.trail_levels(), cells, headings),
@@ -40,7 +47,12 @@ def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
 
 
 def picture(world: World, size: tuple[int, int] = DEFAULT_SIZE) -> np.ndarray:
-    """Return a picture of a world and its listed ants, uint8 (height, width, 3)."""
+    """Return a picture of a world and its listed ants, uint8 (height, width, 3).
+
+    >>> rendering.picture(worlds.paper(), size=(320, 240)).dtype
+    dtype('uint8')
+    """
+    expect("world", world, World)
     return Scene(world.grid, size).draw(at_start(world, n=len(world.ants)))
 
 
@@ -49,7 +61,14 @@ def frames(
 ) -> Iterator[np.ndarray]:
     """Yield pictures of snapshots of one world, uint8 (height, width, 3), one by one.
 
-    `size` is width and height in pixels; `look` are further arguments of `Scene`.
+    Args:
+        snapshots: Pairs of a `Snapshot` and its `Status`, or None, as `colony_snapshots` yields.
+        size: Width and height in pixels.
+        look: Further arguments of `Scene`.
+
+    >>> pictures = rendering.frames(rendering.colony_snapshots(colony), size=(320, 240))
+    >>> next(pictures).shape
+    (240, 320, 3)
     """
     scene = None
     for snapshot, status in snapshots:
@@ -60,14 +79,23 @@ def frames(
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """An episode in which an ant follows a policy: rollout 0 of a seed."""
+    """An episode in which an ant follows a policy: rollout 0 of a seed.
+
+    Attributes:
+        trace: Its steps.
+        name: Its name in the panel of pictures, such as "greedy".
+
+    >>> episode = rendering.Episode.play(worlds.paper(), result.q_values[0, 0])
+    >>> len([*episode.snapshots()]) == len(episode.trace) + 1
+    True
+    """
 
     trace: Trace
-    name: str  # in the panel
+    name: str
 
     @classmethod
     def play(cls, world: World, q_values: np.ndarray, **rules: Any) -> Episode:
-        """Return rollout 0 of a policy; `rules` and errors are those of `rollout`."""
+        """Return rollout 0 of a policy; arguments and errors are those of `rollout`."""
         name = f"epsilon {rules['epsilon']:g}" if rules.get("epsilon") else "greedy"
         return cls(rollout(world, q_values, **rules), name)
 
@@ -121,6 +149,9 @@ def colony_snapshots(
         frame_interval: Ticks between snapshots, at least 1.
         follow: The number of an ant, from 0. Its view, state and action values are shown while it
             lives. None follows no ant.
+
+    >>> [len(shown.ant_cells) for shown, status in rendering.colony_snapshots(colony, ticks=2)]
+    [16, 16, 16]
     """
     between = intervals(colony, ticks, frame_interval, follow)
     yield _snapshot(colony, follow)

@@ -80,6 +80,9 @@ def save_animation(
         frames: One or more frames, uint8 (height, width, 3), all of the same size.
         fps: Frames per second.
         pause: Seconds, at most 60, for which the last frame is shown before the animation repeats.
+
+    >>> pictures = rendering.frames(rendering.colony_snapshots(colony, ticks=2), size=(320, 240))
+    >>> rendering.save_animation("ants.gif", pictures, fps=10)
     """
     target = check_animation(path, fps)
     expect("frames", frames, Iterable)
@@ -96,10 +99,12 @@ def save_animation(
 
 
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
-    """Write a picture, uint8 (height, width, 3), as PNG.
+    """Write a picture to a PNG file; a `frame` is uint8 (height, width, 3).
 
     Raises:
         AntsError: The file does not end in .png, or is not writable.
+
+    >>> rendering.save_picture("world.png", rendering.picture(worlds.paper(), size=(320, 240)))
     """
     save_animation(check_file(path, "one picture", ".png"), [frame])
 

@@ -12,7 +12,11 @@ from collections.abc import Sequence
 
 
 def exp(x: float) -> float:
-    """Return e to the power of x; 0 below -708."""
+    """Return e to the power of x; 0 below -708.
+
+    >>> rules.exp(1.0)
+    2.7182818284590455
+    """
     if x < -708.0:
         return 0.0
     x = min(x, 709.0)
@@ -25,7 +29,11 @@ def exp(x: float) -> float:
 
 
 def log(x: float) -> float:
-    """Return the natural logarithm of a normal number above 0; ValueError for other numbers."""
+    """Return the natural logarithm of x, a normal number above 0; ValueError for other numbers.
+
+    >>> rules.log(8.0) / rules.log(2.0)
+    3.0
+    """
     if not 2.0**-1022 <= x < math.inf:
         raise ValueError(f"log({x}) is not defined")
     (bits,) = struct.unpack("<Q", struct.pack("<d", x))
@@ -43,7 +51,11 @@ def log(x: float) -> float:
 
 
 def power(x: float, y: float) -> float:
-    """Return x to the power of y, for normal x > 0 and 0 <= y <= 1000; else ValueError."""
+    """Return x to the power of y, for normal x > 0 and 0 <= y <= 1000; else ValueError.
+
+    >>> rules.power(2.0, 10)
+    1024.0
+    """
     if not (2.0**-1022 <= x < math.inf and 0 <= y <= 1000):
         raise ValueError(f"power({x}, {y}) is not defined; x must be above 0, and y from 0 to 1000")
     y = float(y)
@@ -61,6 +73,9 @@ def pick(weights: Sequence[float], random: float) -> int:
     Args:
         weights: The weights of the entries.
         random: A random number from 0 to less than 1; the index never falls as it rises.
+
+    >>> [rules.pick([1.0, 3.0], random) for random in (0.2, 0.3)]
+    [0, 1]
     """
     counted, total = [min(weight, 1e300) if weight >= 1e-300 else 0.0 for weight in weights], 0.0
     for weight in counted:

@@ -33,7 +33,7 @@ _OF_ACTIONS = {  # of rules that are called after an action
 }
 KINDS: dict[str, RuleKind] = {
     "choice": RuleKind(
-        "an action: 0 left, 1 forward, 2 right, 3 pick up, 4 give",
+        "an action: 0 left, 1 forward, 2 right, 3 pick up, 4 deliver",
         *(0, 4, True),
         {
             "values": Input("action values of the ant's state; the ants then need a table", 5),

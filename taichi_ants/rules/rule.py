@@ -36,6 +36,14 @@ def register(
     Raises:
         AntsError: A name is taken or not known, the function contains something that kernels cannot
             compute, or a result for drawn inputs is outside the range of the kind.
+
+    >>> @rules.register("deposit")
+    ... def refresh(level, carries, most=200):
+    ...     return max(level, most * carries)
+    >>> rules.names("deposit")
+    ('refresh',)
+    >>> Task(pheromone=Pheromone(deposit="refresh")).rules["refresh"].most
+    200
     """
     check_one_of("the kind of the rule", kind, tuple(KINDS))
 

@@ -211,7 +211,7 @@ def given_world(settings: argparse.Namespace) -> World:
 
     given = given_settings(settings).get("world", {})
     if "seed" in given:
-        worlds.check_seed_counts(settings.world)
+        worlds.registry.check_seed_counts(settings.world)
     return worlds.build(settings.world, **given)
 
 

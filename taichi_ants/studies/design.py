@@ -82,11 +82,18 @@ class Design(Settings):
     of a point for each setting that varies and two more.
     """
 
-    design: Annotated[Literal["grid", "sobol"], Setting()] = "grid"
-    samples: Annotated[int | None, Setting(only=_DRAWN)] = None
-    design_seed: Annotated[int, Setting(least=0, most=2**63 - 1, only=_DRAWN)] = 0
-    sensitivity: Annotated[Flag, Setting(only=_DRAWN)] = False
-    margin: Annotated[float, Setting(least=0, only=("design", "grid"))] = 0.0
+    design: Annotated[
+        Literal["grid", "sobol"], Setting("all combinations of values, or points from ranges")
+    ] = "grid"
+    samples: Annotated[int | None, Setting("number of points, a power of 2", only=_DRAWN)] = None
+    design_seed: Annotated[
+        int, Setting("seed of the points", least=0, most=2**63 - 1, only=_DRAWN)
+    ] = 0
+    sensitivity: Annotated[Flag, Setting("compute sensitivity indices", only=_DRAWN)] = False
+    margin: Annotated[
+        float,
+        Setting("largest difference that does not matter", least=0, only=("design", "grid")),
+    ] = 0.0
 
     @property
     def is_grid(self) -> bool:

@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -67,7 +67,7 @@ class Drawn:
         cls, preset: str, first: int = 0, regions: Mapping[str, Any] | None = None, **settings: Any
     ) -> Drawn:
         """Return the worlds that `worlds.build(preset, first + seed, **settings)` draws."""
-        for declared in worlds.settings_of(preset) if preset in worlds.names() else ():
+        for declared in worlds.registry.settings_of(preset) if preset in worlds.names() else ():
             if declared.name in settings:  # so that equal numbers of other types are equal
                 settings[declared.name] = declared.checked(settings[declared.name])
         return cls(json.dumps([preset, first, settings, regions or {}], sort_keys=True))
@@ -206,8 +206,12 @@ class ColonyPoint:
     training: TrainingConfig
     pool: tuple[World, ...] | None = None
     ants: Annotated[int, Setting("number at the start", unit="ants")] = 1
-    sharing: Annotated[str, Setting("whether ants learn into one table or their own")] = "shared"
-    start: Annotated[str, Setting("start cells of ants that the world does not list")] = "nest"
+    sharing: Annotated[
+        Literal["shared", "independent"], Setting("whether ants learn into one table or their own")
+    ] = "shared"
+    start: Annotated[
+        Literal["nest", "spread"], Setting("start cells of ants that the world does not list")
+    ] = "nest"
     capacity: Annotated[int | None, Setting("largest number of living ants", unit="ants")] = None
     episodes: Annotated[int, _TRAINING] = 50
     ticks: Annotated[int, Setting("length of an episode", unit="ticks")] = 1000
@@ -218,7 +222,9 @@ class ColonyPoint:
     measures: tuple[str, ...] = ()
     measure_every: Annotated[int | None, Setting("time between measures", unit="ticks")] = None
     protocol: tuple[ProtocolEvent, ...] = ()
-    during: Annotated[str, Setting("episodes in which the events happen")] = "evaluation"
+    during: Annotated[
+        Literal["evaluation", "training", "both"], Setting("episodes in which the events happen")
+    ] = "evaluation"
     kind: ClassVar[str] = "colony"
 
     def __post_init__(self) -> None:

@@ -211,7 +211,9 @@ def run(
                 continue
             text = " ".join(str(outcome).split()).rstrip(".")
             kind = "" if isinstance(outcome, AntsError) else f"{type(outcome).__name__}: "
-            failed.append(f"{stage.named(block)} ({kind}{text})")
+            why = f"({kind}{text})"
+            same = bool(failed) and failed[0].endswith(why)
+            failed.append(f"{stage.named(block)} {'(for the same reason)' if same else why}")
             if len(failed) == _HOPELESS and not (mine & ~study.missing(store)).any():
                 break
         if failed:

@@ -123,9 +123,10 @@ def sweep_of(file: Settings) -> Sweep:
     (against,) = against.items() if len(against) == 1 else [None]
     of_grid = drawn.is_grid and any(against in row.items() for row in rows)
     if ("against" in file or "margin" in file) and not of_grid:
+        said = "{} = {}".format(*against) if against else shown(file.get("against"))
         raise AntsError(
-            f"against is {shown(file.get('against'))}; with a grid, it must be one setting with "
-            "one of its values in [vary], which margin requires."
+            f"against is {said}; with a grid, it must be one setting of [vary] with one of the "
+            "values there, which margin requires."
         )
     arrays = base.measures
     if "measure_every" in base.reading:

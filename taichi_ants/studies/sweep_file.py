@@ -27,10 +27,34 @@ from taichi_ants.studies.points import ColonyPoint, Drawn, FixedPolicy, Point, R
 from taichi_ants.task import Task
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
-_OF_FILE = (  # keys that are not settings of points
-    *("kind", "seeds", "measures", "measure_every", "against", "vary"),
-    *(key.name for key in declared(Design)),
-)
+# Keys that are not settings of points; docs/reference/sweep_keys.md shows them.
+KEYS = {
+    "kind": '`"runs"` for lone ants, which are trained and then followed greedily, or `"colony"` '
+    "for many ants in one world, which learn and are then evaluated with frozen action values",
+    "measures": "one or more measures of this kind; figures show the first",
+    "measure_every": 'time between the values in `series.csv`, in ticks; kind `"colony"`, off by '
+    "default",
+    "seeds": "the number of seeds (0, 1, 2 ...), 10 by default, or a list of them",
+    "vary": "the settings that vary: in a table `[vary]`, or in several `[[vary]]`, each with its "
+    "own combinations",
+    "against": "the baseline: a setting of `[vary]` with one of its values",
+    **{
+        key.name: f"{key.rule.help}; {key.in_words[0]} (default: {key.in_words[1]})"
+        for key in declared(Design)
+    },
+}
+# Settings of points whose values are read in another form.
+WORLD_KEYS = {
+    "world.preset": 'a registered name, `"paper"` by default, or the path of a map relative to the '
+    "folder in which you run the command",
+    "world.seed": "the seed of a world that is drawn at random; 0 by default",
+    "world.per_seed": 'draw a world for each seed, from `world.seed` + seed; kind `"colony"`',
+    "world.regions": "regions that the world gets: a list of cells, or `{centre = [x, y, z], "
+    "radius = 3}`, by name",
+    "task.preset": 'the task to start from, `"paper"` by default; other keys of `task` change it',
+    "policy": "with `episodes = 0`, and without `[training]`: the policy that ants follow, a file "
+    '(`"policy.npz"`), `"trail_follower"` or `"random"`',
+}
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
 # Measures of reward, and the deliveries that sweeps report beside them: ants can collect rewards
@@ -78,7 +102,7 @@ class Base(NamedTuple):
             if not isinstance(file[name], list) or kind != "colony":
                 raise AntsError(f"[{name}] must be [[{name}]], in a file of kind 'colony'.")
             tables[name] = {str(n): event for n, event in enumerate(file[name], start=1)}
-        fixed = flat({name: table for name, table in tables.items() if name not in _OF_FILE})
+        fixed = flat({name: table for name, table in tables.items() if name not in KEYS})
         seeds = file.get("seeds", 10)
         if not isinstance(seeds, list):
             seeds = range(checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds"))
@@ -97,7 +121,7 @@ class Base(NamedTuple):
             raise AntsError("[vary] is empty; add lists of values of the settings that vary.")
         axes: dict[str, Axis] = {}
         for name, values in settings_in(table):
-            if not values or name in _OF_FILE:
+            if not values or name in KEYS:
                 raise AntsError(f"{name} cannot vary, or has no values; give a value or a range.")
             for other in self.fixed:  # a group and one of its settings exclude each other, too
                 if f"{other}.".startswith(f"{name}.") or f"{name}.".startswith(f"{other}."):
@@ -135,7 +159,7 @@ class Base(NamedTuple):
         for name in tree:  # the world, task, training and events check theirs
             if name not in known:
                 of = f"a sweep of kind {self.kind!r}"
-                raise AntsError(f"{name!r} {not_a_setting(name, [*known, *_OF_FILE], of)}")
+                raise AntsError(f"{name!r} {not_a_setting(name, [*known, *KEYS], of)}")
         preset = task.pop("preset", "paper")
         check_one_of("task.preset", preset, tuple(Task.named()))
         task = Task.named()[preset].replace(**task)
@@ -208,7 +232,7 @@ def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:
         known = [s._replace(path=s.name) for s in declared(of) if not s.is_group]
     else:
         preset = fixed.get("world.preset", "paper")
-        of_world = worlds.settings_of(preset) if preset in worlds.names() else ()
+        of_world = worlds.registry.settings_of(preset) if preset in worlds.names() else ()
         known = [*all_of(Task), *declared(TrainingConfig), *of_world]
         for named in named_groups(Task):
             entry = re.match(rf"{named.path}\.([^.]+)\.", path)
@@ -237,7 +261,7 @@ def _world(kind: str, settings: Settings) -> Any:
     if per_seed not in ((True, False) if kind == "colony" else (False,)):
         refuse("world.per_seed", per_seed, "true or false for kind 'colony', else left out")
     if per_seed or first is not None:
-        worlds.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
+        worlds.registry.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
     first = checked_whole("world.seed", first or 0, -(2**62), 2**62)
     if per_seed:
         return Drawn.by(preset, first, regions, **settings)

@@ -13,13 +13,18 @@ from collections.abc import Callable
 from taichi_ants.errors import checked_whole
 from taichi_ants.task.constants import N_STATES, SEES_CUE, SEES_GOAL
 
+__all__ = ["CELL_LETTERS", "REACHABLE_STATES", "TASK_NAMES", "state_from_index", "state_name"]
 # Indexed by `carries`; letters are then indexed by code.
 TASK_NAMES: tuple[str, str] = ("foraging", "carrying")
 CELL_LETTERS: tuple[str, str] = ("EOTF", "EOSQ")
 
 
 def state_from_index(index: int) -> tuple[bool, int, int, int]:
-    """Return whether the ant carries food, and the codes left, forward and right, for 0 to 127."""
+    """Return the load and the codes left, forward and right of a state, by its index, 0 to 127.
+
+    >>> states.state_from_index(8)
+    (False, 0, 2, 0)
+    """
     index = checked_whole("the state index", index, 0, N_STATES - 1)
     return bool(index >> 6), (index >> 4) & 3, (index >> 2) & 3, index & 3
 
@@ -28,7 +33,11 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
     """Return a function that names states of n cells in view by the letters of their codes."""
 
     def name_of(row: int) -> str:
-        """Return the name of a state by its index."""
+        """Return the name of a state by its index, which is the row of a table.
+
+        >>> states.state_name(8)
+        'foraging E T E'
+        """
         row, codes = checked_whole("a state", row, 0, 2 * len(foraging) ** n_cells - 1), []
         for _ in range(n_cells):
             row, code = divmod(row, len(foraging))

@@ -35,6 +35,9 @@ class Traffic(Settings, path="task.traffic"):
 
     A pushed ant gets the reward of a move onto an empty cell. With `follow`, all ants of a queue
     move at once, but a ring of ants does not move.
+
+    >>> Task(traffic=task.Traffic(swap=True)).traffic.follow
+    False
     """
 
     sentences: ClassVar[dict[str, str]] = {
@@ -66,7 +69,11 @@ class Traffic(Settings, path="task.traffic"):
 
     @classmethod
     def named(cls) -> Mapping[str, Traffic]:
-        """Return the named values: "blocking", "right_of_way" and "following"."""
+        """Return the named values: "blocking", "right_of_way" and "following".
+
+        >>> sorted(task.Traffic.named())
+        ['blocking', 'following', 'right_of_way']
+        """
         return {
             "blocking": cls(),
             "right_of_way": cls(swap=True),
@@ -222,7 +229,11 @@ class Task(Settings, path="task"):
         )
 
     def replace(self, /, **changes: Any) -> Task:
-        """Return the task with changes; rules that it no longer uses lose their parameters."""
+        """Return the task with changes; rules that it no longer uses lose their parameters.
+
+        >>> Task().replace(pheromone={"level": 300}).pheromone.level
+        300
+        """
         bare, parameters = self, changes.pop("rules", {})
         if self.rules:
             bare = copy.copy(self)
@@ -261,7 +272,11 @@ class Task(Settings, path="task"):
     @classmethod
     @cache
     def named(cls) -> Mapping[str, Task]:
-        """Return the named tasks: "paper", "fetching", "foraging" and "queueing"."""
+        """Return the named tasks: "paper", "fetching", "foraging" and "queueing".
+
+        >>> sorted(Task.named())
+        ['fetching', 'foraging', 'paper', 'queueing']
+        """
         built = (paper, fetching, foraging, queueing)
         return MappingProxyType({function.__name__: function() for function in built})
 
@@ -311,7 +326,7 @@ class Task(Settings, path="task"):
 
     @property
     def cues(self) -> tuple[str, ...]:
-        """The names of all cues by number: the trail, fields; others from -1, the compass."""
+        """The names of all cues by number, the trail and fields first; -1 is the compass."""
         return (*self.pheromones, *reversed(CUES))
 
     def number_of(self, cue: str) -> int:
@@ -319,12 +334,20 @@ class Task(Settings, path="task"):
         return self.cues.index(cue) - (len(self.cues) if cue in CUES else 0)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the task as names and numbers; `from_dict` reads it."""
+        """Return the task as names and numbers; `from_dict` reads it.
+
+        >>> Task.from_dict(Task(turns_at_queen=True).as_dict()).turns_at_queen
+        True
+        """
         return asdict(self)
 
 
 def foraging() -> Task:
-    """Return a task: trails rise towards food, carriers have right of way, ants see each other."""
+    """Return a task: trails rise towards food, carriers have right of way, ants see each other.
+
+    >>> task.foraging().traffic.swap
+    True
+    """
     return Task(
         observation="ants",
         pheromone=Pheromone(deposit="fading", level=500, view="strongest"),
@@ -337,6 +360,9 @@ def queueing() -> Task:
     """Return `foraging` with queues whose ants move at once, and ants that see which to follow.
 
     If an ant with food is on the strongest trail in view, no weaker trail is seen as T.
+
+    >>> task.queueing().observation
+    'queues'
     """
     view = {"view": "strongest_under_carriers"}
     return foraging().replace(
@@ -350,10 +376,17 @@ def fetching() -> Task:
     An episode of one ant rewards only one pick-up and one delivery. Therefore circling does not
     pay, and the best policy delivers, at discounts from 0.9 to 0.999; see
     `docs/how-to/train_an_agent.md`.
+
+    >>> task.fetching().rewards.shaping
+    0
     """
     return Task(rewards=Rewards(shaping=0))
 
 
 def paper() -> Task:
-    """Return the paper's task, which is the default everywhere."""
+    """Return the paper's task, which is the default everywhere.
+
+    >>> task.paper() == Task()
+    True
+    """
     return Task()

@@ -5,9 +5,7 @@
 - `page` returns the page of a recording, and `save_page` writes it; notebooks show recordings.
 """
 
-from taichi_ants.viewer.page import Recording, check_page, page, save_page
+from taichi_ants.viewer.page import Recording, page, save_page
 from taichi_ants.viewer.recorder import Recorder, record_colony, record_trace
 
-__all__ = [
-    "Recorder", "Recording", "check_page", "page", "record_colony", "record_trace", "save_page",
-]  # fmt: skip
+__all__ = ["Recorder", "Recording", "page", "record_colony", "record_trace", "save_page"]

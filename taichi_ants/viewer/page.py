@@ -59,7 +59,11 @@ def part(name: str, package: str = "taichi_ants.viewer") -> str:
 
 
 def page(recording: Recording) -> str:
-    """Return the HTML page that plays a recording; raise AntsError if it is not a recording."""
+    """Return the HTML page that plays a recording; raise AntsError if it is not a recording.
+
+    >>> viewer.page(viewer.record_colony(colony, ticks=2))[:15]
+    '<!doctype html>'
+    """
     expect("recording", recording, Recording)
     return assemble(
         recording.header["title"], recording=base64.b64encode(recording.to_bytes()).decode()
@@ -122,5 +126,7 @@ def save_page(path: files.PathLike, recording: Recording) -> None:
 
     Raises:
         AntsError: The file does not end in .html, or is not writable.
+
+    >>> viewer.save_page("ants.html", viewer.record_colony(colony, ticks=2))
     """
     files.write_bytes(check_page(path), page(recording).encode())

@@ -39,6 +39,10 @@ class Recorder:
         colony: A colony in an episode.
         title: The title of the page; "" for a description of the colony.
         follow: The number of the ant that the page follows at first.
+
+    >>> recorder = viewer.Recorder(colony, title="A colony")
+    >>> frames = [recorder.snapshot(), recorder.tick(), recorder.tick(10)]
+    >>> recording = viewer.Recording(recorder.header(), frames)
     """
 
     def __init__(self, colony: Colony, title: str = "", follow: int | None = None) -> None:
@@ -72,6 +76,11 @@ class Recorder:
         """Add a point of the curves: at the end of an episode, or within the first one.
 
         Call it with `ended` before another episode begins.
+
+        >>> recorder = viewer.Recorder(colony)
+        >>> frames = [recorder.snapshot(), recorder.tick(100)]
+        >>> recorder.note(ended=True)
+        >>> colony.end_episode()
         """
         colony = self.colony
         if not ended and colony.episode != self._first:
@@ -163,7 +172,7 @@ class Recorder:
             "kinds of food": ", ".join(task.foods),
         }
         if self._learns:
-            lines["learner"] = learners.label(config.learner)
+            lines["learner"] = learners.registry.label(config.learner)
             groups = {"nest": colony.n_nests, "caste": len(task.castes)}
             parts = " and ".join(name for name, n in groups.items() if n > 1)
             shared = f"one per {parts}" if parts else "shared"
@@ -181,7 +190,13 @@ class Recorder:
         return self._frame({})
 
     def whole(self) -> bytes:
-        """Return the last frame with all data, not only changes, for a page without frames."""
+        """Return the last frame with all data, not only changes, for a page without frames.
+
+        >>> recorder = viewer.Recorder(colony)
+        >>> frames = [recorder.snapshot(), recorder.tick()]
+        >>> len(recorder.whole()) > len(frames[-1])
+        True
+        """
         late = copy.copy(self)
         late._forget()
         late._known, late._owners = self._known.copy(), self._owners.copy()
@@ -317,16 +332,20 @@ def record_colony(
     follow: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
-    """Return a recording of a colony's next ticks; other arguments are those of `Recorder`.
+    """Return a recording of a colony's next ticks.
 
     Args:
         colony: A colony in an episode; it advances by `ticks`.
         ticks: The number of ticks; 0 records only the present.
         frame_interval: Ticks between frames; only 1 records the action of each ant.
+        title, follow: As in `Recorder`.
         progress: Called after each frame with the completed share of the work.
 
     Raises:
         AntsError: A number is not allowed, or no episode has begun.
+
+    >>> len(viewer.record_colony(colony, ticks=10, frame_interval=5).frames)
+    3
     """
     between, done = intervals(colony, ticks, frame_interval, follow), 0
     recorder = Recorder(colony, title, follow)
@@ -340,7 +359,12 @@ def record_colony(
 
 
 def record_trace(trace: Trace, title: str = "") -> Recording:
-    """Return a recording of a `rollout` or `trace_training`; AntsError for any other trace."""
+    """Return a recording of a `rollout` or `trace_training`; AntsError for any other trace.
+
+    >>> trace = rollout(worlds.paper(), result.q_values[0, 0], max_steps=20)
+    >>> len(viewer.record_trace(trace).frames) == len(trace) + 1
+    True
+    """
     expect("trace", trace, Trace)
     arguments = trace.arguments
     if arguments is None:

@@ -55,6 +55,10 @@ def double_bridge(
     `long` is at most 2 * short - 3 - aside. With `aside` 0, the first cells of both branches at the
     food's junction are as far from the queen as the junction. With larger values, the first cell of
     the short branch is nearer to her, and that of the long branch is not.
+
+    >>> bridge = worlds.double_bridge(short=12, long=20)
+    >>> len(bridge.region("long")) > len(bridge.region("short"))
+    True
     """
     junctions, branches = bridge_paths(short, long, mirrored, aside)
     corridors = np.concatenate([*branches, junctions])

@@ -84,7 +84,11 @@ def far_piles(
     rock_share: RockShare = 0.15,
     piles: Annotated[Piles, Setting(least=1)] = 3,
 ) -> World:
-    """Return an open world in which all food lies in piles far from the queen."""
+    """Return an open world, drawn with a seed, in which all food lies in piles far from the queen.
+
+    >>> worlds.far_piles(ranges=(20, 20, 20), piles=1).foods.shape
+    (7, 3)
+    """
     return open_world(seed, ranges, rock_share, 0.0, piles)
 
 

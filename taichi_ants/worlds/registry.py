@@ -18,7 +18,11 @@ from taichi_ants.worlds.world import World
 
 
 def paper() -> World:
-    """Return the paper's world: 271 cells, one food item, and a trail along the whole x axis."""
+    """Return the paper's world: 271 cells, one food item, and a trail along the whole x axis.
+
+    >>> worlds.paper().foods.tolist()
+    [[9, 0, 0]]
+    """
     return World(
         ranges=(10, 10, 10),
         queen=(0, 9, 9),
@@ -46,6 +50,10 @@ def register(name: str, builder: Builder) -> None:
     arguments except `seed` need defaults. A builder with an argument `seed` gets a whole number and
     must return the same world for the same number. Raises AntsError if the name is not a word or
     belongs to a built-in world, or if an argument has no default.
+
+    >>> worlds.register("small", lambda seed=0: worlds.open_world(seed, ranges=(8, 8, 8)))
+    >>> worlds.build("small", seed=3).ranges
+    (8, 8, 8)
     """
     WORLDS.check_new(name)
     for argument in _arguments(builder).values():
@@ -74,6 +82,7 @@ def settings_of(name: str) -> tuple[DeclaredSetting, ...]:
 def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
     """Raise AntsError unless the world depends on a seed."""
     if not is_drawn(name_or_path):
+        build(name_or_path)  # the name may be wrong
         drawn = ", ".join(filter(is_drawn, names()))
         raise AntsError(
             f"{option} has no effect on {shown(name_or_path)}, which is not drawn at random; leave "
@@ -84,8 +93,13 @@ def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
 def build(name_or_path: str | os.PathLike[str], seed: int = 0, **settings: Any) -> World:
     """Return the world with a registered name or, if there is none, of a map file.
 
-    The seed is any whole number, which only some builders use; `settings` are those of the world.
-    Raises AntsError if neither the name nor the file exists.
+    Args:
+        name_or_path: A name, see `names`, or the path of a map file, see `load_map`.
+        seed: Any whole number; only worlds that are drawn at random use it.
+        settings: The settings of the world by name, such as `ranges`.
+
+    Raises:
+        AntsError: Neither the name nor the file exists, or a setting is not allowed.
 
     >>> worlds.build("open", seed=3).ranges
     (10, 18, 53)

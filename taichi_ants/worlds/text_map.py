@@ -42,7 +42,13 @@ _LEVEL = re.compile(r"\s*trail\s*=\s*([0-9]{1,10})\s*")
 
 
 def load_map(path: str | os.PathLike[str]) -> World:
-    """Return the world drawn in a UTF-8 file; AntsError if it cannot be read. See `from_text`."""
+    """Return the world drawn in a UTF-8 file; AntsError if it cannot be read. See `from_text`.
+
+    >>> with open("paper.txt", "w") as file:
+    ...     _ = file.write(worlds.to_text(worlds.paper()))
+    >>> worlds.load_map("paper.txt") == worlds.paper()
+    True
+    """
     return from_text(files.read_text(path), str(path))
 
 
@@ -51,6 +57,9 @@ def from_text(text: str, source: str = "the map") -> World:
 
     It is the smallest world that contains all drawn cells; its other cells become obstacles. Raises
     AntsError, which calls the text `source`, if the map is damaged.
+
+    >>> worlds.from_text("F\\n\\n.\\n\\nQ").queen
+    (0, 0, 0)
     """
     expect(source, text, str)
     level, marks, ranges, cells = _read(text, source)

@@ -37,8 +37,9 @@ class World:
         ranges: (X, Y, Z), the number of values of each coordinate, in cells, each at least 1.
         queen: (x, y, z), the cell of the queen of the first nest. Give one cell, or a sequence of
             cells for several nests, at most 7.
-        foods, obstacles: Cells with food or obstacles, int32 (n, 3). Give a sequence of (x, y, z),
-            or such an array. A food item can also be ((x, y, z), kind).
+        foods: Cells with food, int32 (n, 3). Give a sequence of (x, y, z), or such an array. A food
+            item can also be ((x, y, z), kind).
+        obstacles: Cells with rocks, likewise.
         trails: Cells with trails, int32 (T, 4) = x, y, z, level (ticks until the trail has
             evaporated). Give a sequence of ((x, y, z), level), or such an array. Level 0 means no
             trail. If `Pheromone.dense`, levels are float32, so those above 2**24 are rounded.
@@ -121,12 +122,17 @@ class World:
         return {name: f"the world has {n} {name}" for name, n in counts.items() if n > 1}
 
     def with_regions(self, regions: Mapping[str, Any]) -> World:
-        """Return the world with more regions, which replace those of the same names."""
+        """Return the world with more regions, which replace those of the same names.
+
+        >>> near = {"near": {"centre": (0, 9, 9), "radius": 2}}
+        >>> len(worlds.paper().with_regions(near).region("near"))
+        9
+        """
         by_name = validation.parse_regions(self.grid, regions)
         return replace(self, regions={**self.regions, **by_name}) if by_name else self
 
     def region(self, name: str) -> np.ndarray:
-        """Return the flat indices of the cells of a region; AntsError if there is none."""
+        """Return the flat indices of the cells of a region by name; AntsError if there is none."""
         if name not in self.regions:
             known = ", ".join(self.regions) or "none"
             raise AntsError(
@@ -136,7 +142,14 @@ class World:
         return self.grid.index(self.regions[name])
 
     def ground(self) -> np.ndarray:
-        """Return EMPTY, OBSTACLE (also outside), FOOD or QUEEN by cell, uint8 (grid.size,)."""
+        """Return EMPTY, OBSTACLE (also outside), FOOD or QUEEN by cell, uint8 (grid.size,).
+
+        They are constants in `taichi_ants.task.constants`.
+
+        >>> from taichi_ants.task.constants import FOOD
+        >>> (worlds.paper().ground() == FOOD).sum().item()
+        1
+        """
         return self._ground.copy()
 
     @cached_property
@@ -148,20 +161,35 @@ class World:
         return ground
 
     def kinds_by_cell(self) -> np.ndarray:
-        """Return the kind of the food in each cell, uint8 (grid.size,); 0 without food."""
+        """Return the kind of the food in each cell, uint8 (grid.size,); 0 without food.
+
+        >>> worlds.paper().kinds_by_cell().max().item()
+        0
+        """
         kinds = np.zeros(self.grid.size, np.uint8)
         if len(self.food_kinds):
             kinds[self.grid.index(self.foods)] = self.food_kinds
         return kinds
 
     def trail_levels(self) -> np.ndarray:
-        """Return the trail level of each cell, int32 (grid.size,)."""
+        """Return the trail level of each cell, int32 (grid.size,).
+
+        >>> worlds.paper().trail_levels().max().item()
+        25
+        """
         levels = np.zeros(self.grid.size, dtype=np.int32)
         levels[self.grid.index(self.trails[:, :3])] = self.trails[:, 3]
         return levels
 
     def distances(self, nest: int = 0) -> np.ndarray:
-        """Return the steps to a queen without obstacles, int32 (grid.size,); 0 outside."""
+        """Return the steps to the queen of a nest without obstacles, int32 (grid.size,).
+
+        Those outside the world are 0. Nests are numbered from 0.
+
+        >>> world = worlds.paper()
+        >>> world.distances()[world.grid.index((9, 0, 0))].item()
+        18
+        """
         return self._far(nest) * self.grid.exists
 
     def _far(self, nest: int) -> np.ndarray:
@@ -172,7 +200,14 @@ class World:
         return self.grid.closer_to(tuple(self.queens[nest].tolist()))
 
     def walkable(self, starts: np.ndarray) -> np.ndarray:
-        """Return the empty cells within reach of empty cells in `starts`, bool (grid.size,)."""
+        """Return the empty cells within reach of empty cells in `starts`, bool (grid.size,).
+
+        `starts` are flat indices of cells.
+
+        >>> world = worlds.paper()
+        >>> world.walkable(world.start(seed=0)[0]).sum().item()
+        269
+        """
         # Importing scipy.ndimage is slow, and most worlds do not need it.
         from scipy.ndimage import label
 
@@ -182,7 +217,11 @@ class World:
         return np.isin(regions, home[home > 0])
 
     def reachable_foods(self) -> np.ndarray:
-        """Return for each food item whether an ant can walk to it from a queen, bool (F,)."""
+        """Return for each food item whether an ant can walk to it from a queen, bool (F,).
+
+        >>> worlds.paper().reachable_foods().tolist()
+        [True]
+        """
         around = self.grid.index(self.queens)[:, None] + self.grid.offsets
         is_walkable = self.walkable(around.reshape(-1))
         return is_walkable[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)
@@ -195,6 +234,10 @@ class World:
             n: Number of ants, at least 1; the first n listed ants if there are more.
             where: "nest" for the free cells nearest to the ant's queen, "spread" for any free
                 cells. With several nests, ants choose in the order of their numbers.
+
+        >>> cells, headings = worlds.paper().start(seed=0, n=3)
+        >>> worlds.paper().grid.cells(cells)[0].tolist()
+        [0, 8, 8]
         """
         seed, n = whole("seed", seed), checked_whole("n", n)
         check_one_of("where", where, STARTS)
@@ -253,7 +296,11 @@ class World:
 
     @classmethod
     def from_dict(cls, facts: Mapping[str, Any]) -> World:
-        """Return the world of `as_dict`; raises ValueError, KeyError or TypeError."""
+        """Return the world of `as_dict`; raises ValueError, KeyError or TypeError.
+
+        >>> World.from_dict(worlds.paper().as_dict()) == worlds.paper()
+        True
+        """
         names = (*_PARTS, *(name for name in _MORE if name in facts))
         parts = {name: np.array(facts[name]) for name in names}
         return cls(facts["ranges"], facts["queen"], **parts, regions=facts.get("regions", {}))

@@ -31,6 +31,7 @@ def test_results_of_kernels_for_a_gpu_are_those_of_the_cpu(case, capsys):
 
 def test_results_that_differ_are_an_error(monkeypatch, capsys):
     monkeypatch.setattr(gpu.record, "recorded", lambda: (1, {"sarsa-0-noisy": "another"}))
+    monkeypatch.setattr(gpu.record, "of_training", lambda made: "one")
     run("--on-cpu", "--only", "training: sarsa", status=2)
     printed = capsys.readouterr()
     assert "training: sarsa  DIFFERENT\n" in printed.out

@@ -36,6 +36,21 @@ def program_and_lines(text: str) -> tuple[str, list[str]]:
     return "\n\n".join(parts), lines
 
 
+def test_at_most_thirty_pages_are_written_by_hand():
+    """Apart from cards of models, lessons, the page of a broken link, and files of the root.
+
+    A page is generated if most of it is.
+    """
+    by_hand = set()
+    for page in (ROOT / "docs").rglob("*.md"):
+        text = page.read_text("utf-8")
+        own = re.sub(r"<!-- generated: .*?<!-- end -->", "", text, flags=re.S)
+        is_generated = "api" in page.parts or len(own) < len(text) / 2 or own.startswith("```{incl")
+        if not is_generated and not {"models", "lessons", "404.md"} & {*page.parts}:
+            by_hand.add(page)
+    assert 25 < len(by_hand) <= 30, by_hand
+
+
 # Scripts of models have tests of their own, see tests/examples/.
 MARKED = [
     pytest.param(page, marks=pytest.mark.long if "models/" in page else pytest.mark.slow)

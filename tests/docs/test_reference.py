@@ -5,8 +5,11 @@ from __future__ import annotations
 import doctest
 import importlib.util
 import inspect
+import re
+from functools import cached_property
 
 import jedi
+import matplotlib
 import pytest
 from command_lines import ROOT
 
@@ -20,9 +23,28 @@ from taichi_ants.task.observations.observation import OBSERVATIONS
 from taichi_ants.worlds.registry import WORLDS
 
 _PAGE = (ROOT / "docs" / "reference" / "api.md").read_text("utf-8")
-SETUP = next(
-    code for code in _PAGE.split("```python\n") if code.startswith("from taichi_ants import *")
-)
+# What the examples begin with; each begins with a new colony.
+SETUP, COLONY = re.findall(r"```python\n(from dataclasses.*?)(colony = .*?)```", _PAGE, re.S)[0]
+SLOW = {"check_observation", "check_rule", "replay"}
+# Records, codes and functions of kernels, and the public object in whose example they occur.
+SHOWN_BY = {
+    "Event": "HexForageEnv",
+    "ExpectedEpisode": "EpisodeBounds",
+    "LearnerArrays": "Learner",
+    "Parameters": "rules.register",
+    "Policy": "load_policy",
+    "PolicyValues": "importance_sampling",
+    "Reason": "HexForageEnv",
+    "Recording": "Recorder",
+    "Rollout": "HexForageVectorEnv",
+    "Rule": "rules.register",
+    "RuleCheck": "check_rule",
+    "Setting": "Hyperparameters",
+    "Snapshot": "colony_snapshots",
+    "Status": "Scene",
+    "discount_of": "Learner",
+    "values_of": "Learner",
+}
 
 
 def generator():
@@ -40,7 +62,6 @@ PUBLIC = {
     for module in map(GENERATE.imported, GENERATE.MODULES)
     for name in GENERATE.public_names(module)
 }
-OF_THE_PACKAGE = GENERATE.public_names(taichi_ants)
 
 
 def test_the_reference_is_made_from_the_declarations(monkeypatch):
@@ -54,7 +75,10 @@ def test_the_reference_is_made_from_the_declarations(monkeypatch):
 
 
 def test_every_public_object_is_described():
-    described = {name: inspect.getdoc(value) or "" for name, value in PUBLIC.items()}
+    described = {
+        name: GENERATE.DATA.get(name.rpartition(".")[2]) or inspect.getdoc(value) or ""
+        for name, value in PUBLIC.items()
+    }
     assert len(described) > 150
     assert [name for name, text in described.items() if len(text.split()) < 4] == []
     colony = taichi_ants.Colony
@@ -64,33 +88,96 @@ def test_every_public_object_is_described():
     assert bare == []
 
 
-@pytest.mark.parametrize("name", OF_THE_PACKAGE)
-def test_every_object_of_the_package_has_an_example(name):
-    assert ">>> " in inspect.getdoc(PUBLIC[f"taichi_ants.{name}"])
+def examples_of(value) -> str:
+    """The lines of the examples in a docstring."""
+    lines = (inspect.getdoc(value) or "").splitlines()
+    return "\n".join(line for line in lines if line.startswith((">>> ", "... ")))
+
+
+def test_every_public_callable_has_an_example():
+    of = {name.partition(".")[2]: examples_of(value) for name, value in PUBLIC.items()}
+    known = {name.rpartition(".")[2] for name in of}
+    for name, other in SHOWN_BY.items():
+        assert name in known
+        assert any(text for full, text in of.items() if f".{full}".endswith(f".{other}")), other
+    without = []
+    for name, text in of.items():
+        value, last = PUBLIC[f"taichi_ants.{name}"], name.rpartition(".")[2]
+        members = GENERATE.public_members(value)
+        called = "\n".join([text, *map(examples_of, members.values())])
+        if not called.strip() and last not in {*SHOWN_BY, *GENERATE.DATA}:
+            without.append(name)
+        is_called = (m for m, v in members.items() if not isinstance(v, PROPERTIES))
+        without += [f"{name}.{member}" for member in is_called if f".{member}(" not in called]
+    assert without == []
+
+
+def test_every_argument_is_described():
+    missing, known = [], {"facts", "path", "more", "named", "title", "values"}
+    for full, public in PUBLIC.items():
+        members = GENERATE.public_members(public).items()
+        for name, value in ((full, public), *((f"{full}.{name}", v) for name, v in members)):
+            text = inspect.getdoc(value) or ""
+            is_elsewhere = re.search(r"[Aa]rguments\b[^.]* are those of", text)
+            if is_elsewhere or isinstance(value, PROPERTIES) or full.rpartition(".")[2] in SHOWN_BY:
+                continue
+            value = getattr(value, "__func__", value)
+            arguments = {*inspect.signature(value).parameters} if callable(value) else set()
+            arguments -= {"self", "cls", "args", "kwargs"} | known
+            missing += [f"{name}: {a}" for a in arguments if not re.search(rf"\b{a}\b", text)]
+    assert missing == []
+
+
+def test_the_docstrings_of_properties_are_sentences_with_the_right_type(names):
+    exec(COLONY, names)
+    for public in filter(inspect.isclass, PUBLIC.values()):
+        for name, member in GENERATE.public_members(public).items():
+            if isinstance(member, PROPERTIES):
+                text = inspect.getdoc(member)
+                assert ": " not in text.partition("\n\n")[0], name  # which is a type for Sphinx
+                kind = re.search(r"\b(u?int\d+|float\d+|bool) \(W", text)
+                assert not kind or getattr(names["colony"], name).dtype == kind[1], name
+
+
+PROPERTIES = property, cached_property
+_BY_ID = {
+    id(value): (name, value)
+    for full, public in reversed(PUBLIC.items())
+    for name, value in (
+        (full, public),
+        *((f"{full}.{name}", value) for name, value in GENERATE.public_members(public).items()),
+    )
+    if examples_of(value)
+}
+SHOWN = dict(_BY_ID.values())
 
 
 @pytest.fixture(scope="module")
 def names():
     """The names with which the examples begin."""
     made: dict[str, object] = {}
-    exec(SETUP.split("```")[0], made)
+    exec(SETUP, made)
     return made
 
 
-_SHOWN = {
-    id(value): name for name, value in reversed(PUBLIC.items()) if ">>> " in (value.__doc__ or "")
-}
-
-
-@pytest.mark.parametrize("name", _SHOWN.values())
-def test_the_example_of(name, names, monkeypatch):
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name.split(".")[-1] in SLOW else [])
+        for name in SHOWN
+    ],
+)
+def test_the_example_of(name, names, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
     for registry in REGISTRIES:
         monkeypatch.setattr(registry, "yours", dict(registry.yours))
+    made, failures = dict(names), []
+    if "colony" in examples_of(SHOWN[name]):
+        exec(COLONY, made)
     parser, runner = doctest.DocTestParser(), doctest.DocTestRunner(verbose=False)
-    text, failures = inspect.getdoc(PUBLIC[name]), []
-    example = parser.get_doctest(text, dict(names), name, None, 0)
-    names["colony"].begin_episode()
-    runner.run(example, out=failures.append)
+    example = parser.get_doctest(inspect.getdoc(SHOWN[name]), made, name, None, 0)
+    with matplotlib.rc_context():
+        runner.run(example, out=failures.append)
     assert not failures, "".join(failures)
 
 
@@ -104,3 +191,9 @@ def test_help_and_editors_know_the_settings(kind):
     code = f"from taichi_ants import {kind.__name__}\n{kind.__name__}("
     [seen] = jedi.Script(code).get_signatures()
     assert {one.name for one in settings} <= {one.name for one in seen.params}
+
+
+def test_editors_know_the_views_of_a_colony():
+    code = "from taichi_ants import Colony, worlds\ncolony = Colony(worlds.paper())\ncolony."
+    seen = {one.name for one in jedi.Script(code).complete()}
+    assert {*GENERATE.public_members(taichi_ants.Colony)} <= seen

@@ -117,7 +117,13 @@ def run_script(text, folder, **variables):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("name", learners.names())
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(one, marks=[pytest.mark.long] * (one not in (*RULES, "prioritized_sweeping")))
+        for one in learners.names()
+    ],
+)
 def test_training_is_the_same_as_on_a_gpu(name, as_on_gpu, monkeypatch):
     config = TrainingConfig(name, 0.2, 0.9, 0.3, 0.97, learning_rate_decay=0.99)
     world, task = worlds.paper(), RULES.get(name)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_lines import contents, run
+from command_lines import contents, read_csv, run
 
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, worlds
 from taichi_ants.task import foraging, queueing
@@ -59,8 +58,7 @@ def test_all_files_are_there(finished):
     )
     assert "Trained in open worlds, 3 ants, 2 seeds, too few for a verdict" in page
     assert page.count('class="player"') == 3
-    with open(folder / "conditions.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_csv(folder / "conditions.csv")
     # In the paper's world seven rules for one and three ants, and of three rules those that were
     # trained alone, or in open worlds; the latter in small worlds, too.
     assert len(rows) == 7 * 2 + 3 + 3 + 3
@@ -109,8 +107,7 @@ def test_ants_are_evaluated_in_worlds_that_they_have_not_seen(finished):
 
 def assert_measured(folder, condition, outcome):
     """The measures of each seed are those of episodes (episodes, seeds) of three ants."""
-    with open(folder / "seeds.csv", newline="") as file:
-        rows = [row for row in csv.DictReader(file) if tuple(row.values())[:4] == condition]
+    rows = [r for r in read_csv(folder / "seeds.csv") if tuple(r.values())[:4] == condition]
     assert [int(row["seed"]) for row in rows] == list(SEEDS)
     blocked = outcome.blocked.sum(axis=0) / outcome.moves.sum(axis=0)
     first = np.where(outcome.first_delivery < 0, TICKS, outcome.first_delivery).mean(axis=0)

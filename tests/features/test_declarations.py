@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,7 @@ def test_hooks_call_no_plain_functions():
         assert not plain_calls(path.read_text("utf-8")), path.name
 
 
+@cache
 def identifiers(path: Path) -> set[str]:
     """Return the names, attributes, arguments and texts of a file, without `loads` of modules."""
     found = set()

@@ -7,9 +7,10 @@ import re
 from pathlib import Path
 
 import pytest
-from browser import started
+from browser import Page, started
 
 DOCS = Path(__file__).parents[2] / "docs"
+FILE = DOCS / "lessons.html"
 # Experiments whose numbers are those of the notebook, cell by cell.
 SAME = ("markov", "sweep", "values", "update", "wrong", "planning", "opens", "two", "practice")
 FUNCTION = "function qLearning(q, s, a, r, sNext, terminated, alpha, gamma) { %s }"
@@ -22,21 +23,21 @@ def browser():
         yield one
 
 
+class Lessons(Page):
+    ready = "window.lessons"
+
+
 @pytest.fixture
 def opened(browser):
-    faults = []
+    pages = []
 
     def open_page(address, width=1024):
-        size = {"width": width, "height": 768}
-        tab = browser.new_context(viewport=size, offline=True).new_page()
-        tab.on("pageerror", lambda error: faults.append(str(error)))
-        tab.on("console", lambda message: faults.append(message.text))
-        tab.goto((DOCS / "lessons.html").as_uri() + address)
-        tab.wait_for_function("window.lessons")
-        return tab
+        pages.append(Lessons(browser, FILE.as_uri() + address, (width, 768)))
+        return pages[-1].tab
 
     yield open_page
-    assert faults == []
+    for page in pages:
+        page.close()
 
 
 def numbers(text):
@@ -72,7 +73,7 @@ def test_a_question_waits_for_a_prediction_and_a_function_is_checked_step_by_ste
     tab.keyboard.type("Equal to the last bit")
     assert check.is_enabled()
     for written, said in (
-        ("q[s][a] += (", "not yet JavaScript that runs: "),
+        ("q[s][a] += (", "This JavaScript does not run yet: "),
         ("q[s][b] = r;", "Your function stopped with an error: b is not defined."),
         ("while (true) { }", "Your function stopped with an error: a loop does not end."),
         ("q[s][a] += alpha * r;", "In episode 0, step"),

@@ -57,7 +57,10 @@ def visits(draw):
                     q, r = ahead
                     path.append(ahead)
         if path:
-            does, reach = draw(st.sampled_from(lab.STROKES)), draw(st.integers(0, 7))
+            does, reach = (
+                draw(st.sampled_from([*filter(None, lab.STROKES)])),
+                draw(st.integers(0, 7)),
+            )
             if events and "path" in events[-1]:
                 does, reach = events[-1]["do"], events[-1]["reach"]
             width, end = 2 * radius + 1, (q, r)
@@ -133,7 +136,7 @@ def food_in_reach(world):
 @pytest.mark.slow
 def test_most_food_of_each_day_can_be_reached():
     daily = next(number for number, world in enumerate(WORLDS) if world.get("daily"))
-    days = np.arange("2026-11-01", "2036-11-01", 5, dtype="datetime64[D]").astype(str)
+    days = np.arange("2026-11-01", "2036-11-01", 25, dtype="datetime64[D]").astype(str)
     food = [food_in_reach(lab_world(daily, int(day.replace("-", "")))) for day in days]
     assert min(food) >= 20
 

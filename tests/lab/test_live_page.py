@@ -70,6 +70,15 @@ def test_a_visit_can_be_looked_back_at_continued_and_saved(tmp_path):
         tab.keyboard.press(" ")
         until(tab, f"() => viewer.history.frames.at(-1).ticks > {TICK + 4}")
         tab.keyboard.press(" ")
+        tab.keyboard.press("4")  # a trail
+        tab.mouse.click(x, y - 40)
+        tab.click("#copy-link")
+        until(tab, "() => document.getElementById('toast').textContent.startsWith('Link copied')")
+        address = tab.evaluate("location.href")
+        _, events = lab.decoded(address.split("#")[1].split(";")[0])
+        assert events[-1].does == "trail"
+        assert lab.replay(address).equal
+        tab.click("#undo")  # the trail, then the wall
         tab.click("#undo")
         until(
             tab, f"() => viewer.history.frames.at(-1).ticks === {TICK} && ({ROCKS})() === {before}"

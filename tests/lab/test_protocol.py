@@ -68,6 +68,7 @@ def comparable(message: str | bytes) -> Any:
         kept = ("value", "least", "most", "step", "path")
         names = values.keys() & {"ants", "epsilon", "learning_rate"}
         own["values"] = {name: {key: values[name][key] for key in kept} for name in names}
+    said.pop("link", None)  # of the worker only
     return {key: own.get(key, one) for key, one in said.items()}
 
 
@@ -75,7 +76,7 @@ CELLS = range(2100, 2112)
 EDITS = [
     {"place": {"what": "rock", "cells": [*CELLS]}},
     {"clear": {"cells": [*CELLS[:4]]}},
-    {"trail": {"level": 300, "cells": [*CELLS[2:], 2000]}},
+    {"trail": {"level": 500, "cells": [*CELLS[2:], 2000]}},
     {"ants": 30},
     {"ants": 50},
     {"place": {"what": "food", "cells": [*CELLS[:3]]}},

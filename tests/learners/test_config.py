@@ -54,7 +54,7 @@ def test_rates_fall_by_their_factors_down_to_their_least():
 def test_hyperparameters_are_those_of_the_learner(learner, name, value, says):
     config = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99, hyperparameters={name: value})
     with pytest.raises(AntsError) as caught:
-        learners.with_hyperparameters(config)
+        learners.registry.with_hyperparameters(config)
     assert says in str(caught.value)
 
 

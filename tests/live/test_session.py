@@ -77,7 +77,7 @@ SETUPS = {
     "rules": Setup("open", OWN, LEARNS, 20, world_settings=SMALL),
 }
 BUMP = RULES.yours.pop("live_bump")  # registered only while the tests of this file run
-LATER = ("queueing", "lively")
+LATER = ("queueing", "lively", "foraging")  # two nests forage as well
 MARKED = [pytest.param(one, marks=[pytest.mark.long] * (one in LATER)) for one in SETUPS]
 
 

@@ -12,7 +12,8 @@ from PIL import Image
 
 from taichi_ants import AntsError, rendering
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.rendering import Episode, check_animation, colours, save_animation, save_picture
+from taichi_ants.rendering import Episode, colours, save_animation, save_picture
+from taichi_ants.rendering.writers import check_animation
 from taichi_ants.worlds import paper
 
 SIZE = (330, 324)

@@ -211,6 +211,7 @@ def test_a_block_at_which_all_workers_die_is_named(fails, tmp_path, monkeypatch)
     assert caught.value.exit_status == 1
     assert f"{TRIES} workers died at it, perhaps because memory was" in str(caught.value)
     assert ("2 blocks failed: " in str(caught.value)) == (fails == "one")
+    assert "(for the same reason)" in str(caught.value)
     if fails == "one":
         assert executor.calls == len(files_in(tmp_path)) + 2 * TRIES
     assert "abruptly" not in str(caught.value)

@@ -15,10 +15,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import columns
 import pytest
 
 from taichi_ants import commands
+from taichi_ants.studies.columns import SWEEP
 
+TABLES = (SWEEP, columns.COMPARE, columns.COLONY, columns.BRIDGE)
 ROOT = Path(__file__).resolve().parents[2]
 EXPERIMENTS = ROOT / "experiments"
 
@@ -115,9 +118,13 @@ def _ended(work: Callable[[], object], capsys: pytest.CaptureFixture[str]) -> tu
 
 
 def read_csv(path: Path | str) -> list[dict[str, str]]:
-    """Return the rows of a CSV file."""
+    """Return the rows of a CSV file, whose columns must be those that a table of its name has."""
     with open(path, newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+        table = csv.DictReader(file)
+        rows, heads = list(table), table.fieldnames or ()
+    of_name = [one[Path(path).name] for one in TABLES if Path(path).name in one]
+    assert not of_name or [] in [one.undeclared(heads) for one in of_name], heads
+    return rows
 
 
 def numbers_in(path: Path | str) -> list[dict[str, Any]]:

@@ -26,5 +26,6 @@ def interrupted_after_launch(number: int = 1) -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Launch, "_launch", launch)
+        patch.setattr(Launch, "repeat", Launch.__call__)  # which uses `_launch`
         with pytest.raises(KeyboardInterrupt):
             yield

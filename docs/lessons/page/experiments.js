@@ -43,7 +43,7 @@ export function written(code, name) {
   try {
     own = new Function("round", `"use strict";\n${guarded}\nreturn typeof ${name} === "function" && ${name};`)(round);
   } catch (error) {
-    throw new Error(`This is not yet JavaScript that runs: ${error.message}.`);
+    throw new Error(`This JavaScript does not run yet: ${error.message}.`);
   }
   must(own, `There is no function ${name}; do not change its name.`);
   return (...given) => {
@@ -210,10 +210,10 @@ const fromQueen = (cell) => hexDistance(cell % COLUMNS - CENTRE - QUEEN_AT[0], M
 export const SETTINGS = {
   chance: "A colony at the double bridge: eight ants share one table, which starts with 0 everywhere. How much should they explore?",
   learning: "The same question in the lab’s meadow, where 64 ants with the lab’s rules share one table of Q-learning. The wall appears after 1000 ticks.",
-  pay: "Four ants in the paper’s world share one table, with discount 0.99. They have practised for 20 000 ticks; no delivery ends anything. What do they do for the pay?",
-  direction: "Both kinds of trail in the lab’s meadow, where 64 ants learn together from nothing.",
-  copies: "The same in the lab’s meadow, with the lab’s rules: which ants bring home most, each?",
-  rules: "The rules, one after the other, in the lab’s meadow: 64 ants learn together from nothing.",
+  pay: "Four ants in the paper’s world share one table, with discount 0.99. They have practised for 20 000 ticks; no delivery ends anything. What do they do for their pay?",
+  direction: "Both kinds of trail in the lab’s meadow, where 64 ants learn together from scratch.",
+  copies: "The same in the lab’s meadow, with the lab’s rules: which ants bring home most per head?",
+  rules: "The rules, one after the other, in the lab’s meadow: 64 ants learn together from scratch.",
 };
 
 /**

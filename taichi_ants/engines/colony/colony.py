@@ -25,7 +25,9 @@ class Colony(TickingColony):
     """Colonies of ants, one in each of W worlds, that act and learn tick by tick.
 
     A colony depends only on its world, configuration and seed, not on the other worlds, the number
-    of threads or the schedule.
+    of threads or the schedule. Most of its properties are arrays with an entry for each world, some
+    of them views that you may change. Those (W, capacity) have an entry for each slot, which is a
+    place for an ant, and show the last ant in it. Those of features that the task lacks are 0.
 
     Args:
         world: One world for all seeds, or one per seed, all with the same ranges.
@@ -88,6 +90,10 @@ class Colony(TickingColony):
             every: Read the measures also every n ticks, before the events of the tick.
             protocol: Events with interventions, see `taichi_ants.protocol`. They happen in each
                 episode, which begins without the changes of the one before.
+
+        >>> episodes = colony.run(episodes=2, ticks=100, measures=["deliveries"], every=50)
+        >>> episodes.deliveries.shape, len(episodes.series.ticks)
+        ((2, 1), 4)
         """
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)

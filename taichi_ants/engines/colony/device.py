@@ -10,7 +10,8 @@ import numpy as np
 import taichi as ti
 
 from taichi_ants import runtime
-from taichi_ants.engines.colony.memory import Contents, copies
+from taichi_ants.engines.colony.memory import Contents
+from taichi_ants.engines.device_memory import copy_in, copy_out
 from taichi_ants.engines.launch import type_of
 from taichi_ants.errors import AntsError
 
@@ -83,7 +84,8 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
         if numbers != self._numbers:
             self._write_numbers(numbers)
         for name in self._changed.difference(_OF_THREADS):
-            self._copy(0, name)
+            kind, place = self._places[name]
+            copy_in(self._arrays[name], self._memories[kind], place)
         self._changed.clear()
         self._newer = {*self._places}
         # Taichi crashes without a number; this one is that of `arithmetic.guards`.
@@ -93,7 +95,8 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
         """Copy some arrays from the device, if they are newer there."""
         for name in self._newer.intersection(names):
             self._check_not_lost()
-            self._copy(1, name)
+            kind, place = self._places[name]
+            copy_out(self._memories[kind], self._arrays[name], place)
             self._newer.discard(name)
 
     def _check_not_lost(self) -> None:
@@ -102,10 +105,6 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
                 "Taichi was reset or restarted, which destroys the state of a colony on a GPU; "
                 "save the colony before, and load it afterwards."
             )
-
-    def _copy(self, out: int, name: str) -> None:
-        kind, place = self._places[name]
-        copies(kind)[out](self._memories[kind], place, self._arrays[name].reshape(-1))
 
     def _lay_out(self, numbers: Mapping[str, Any]) -> None:
         """Make memories with room for all numbers and arrays."""
@@ -143,4 +142,4 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
             dtype = f"{kind[0]}{int(kind[1:]) // 8}"
             head = np.array([{**known, **of_arrays}[name] for name in names], dtype)
             if names:
-                copies(kind)[0](self._memories[kind], 0, head)
+                copy_in(head, self._memories[kind])

@@ -17,14 +17,24 @@ from taichi_ants.records import Record
 class ColonyEpisodes(Record, Tidy):
     """Results of episodes, arrays of shape (episodes, worlds).
 
-    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks
-    with food of all delivered loads, `living` ants at the end. `waiting_births` is the food that is
-    not an ant yet at the end, because no cell next to its queen is free or `capacity` ants live.
-    `deliveries_by_nest_and_kind` has deliveries by nest and kind of food, (episodes, worlds, nests,
-    kinds), and `caste_deliveries` by caste, (episodes, worlds, castes), with one column for all
-    ants if there are no castes. Returns, moves, blocked and carried are int64, all others int32.
-    `seeds` has the seed of each world. `series` has the values of the measures that you asked
-    `Colony.run` for, else None.
+    Attributes:
+        returns: int64, the sum of the rewards of all ants.
+        ticks: int32, the length of the episode.
+        deliveries: int32, the number of deliveries.
+        first_delivery: int32, ticks to the first delivery; -1 if there was none.
+        moves: int64, the number of attempts to move.
+        blocked: int64, the number of those that failed.
+        carried: int64, the ticks with food of all delivered loads.
+        births: int32, the number of ants that were born.
+        deaths: int32, the number of ants that died.
+        waiting_births: int32, the food that is not an ant yet at the end, because no cell next to
+            its queen is free or `capacity` ants live.
+        regrown: int32, the number of food items that grew back.
+        living: int32, the number of ants at the end.
+        deliveries_by_nest_and_kind: int32 (episodes, worlds, nests, kinds of food).
+        caste_deliveries: int32 (episodes, worlds, castes); one column if there are no castes.
+        seeds: The seed of each world.
+        series: The values of the measures that you asked `Colony.run` for, else None.
 
     >>> colony.run(episodes=3, ticks=200).deliveries.shape  # episodes, worlds
     (3, 1)
@@ -65,7 +75,11 @@ class ColonyEpisodes(Record, Tidy):
         return counts
 
     def counts(self) -> dict[str, np.ndarray]:
-        """Return the arrays of all counts of worlds by name."""
+        """Return the arrays of all counts of worlds by name.
+
+        >>> sorted(colony.run(1, 100).counts())[:3]
+        ['births', 'blocked', 'carried']
+        """
         arrays = (item for item in vars(self).items() if isinstance(item[1], np.ndarray))
         return {name: array for name, array in arrays if array.ndim == 2}
 

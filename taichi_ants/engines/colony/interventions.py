@@ -347,7 +347,7 @@ class Interventions:
     """Changes of some worlds of a colony, and of the start of their later episodes.
 
     Args:
-        colony: A `Colony`, which imports this module.
+        colony: The `Colony` to change.
         worlds: Numbers of the worlds to change, None for all. Worlds of a colony share the numbers
             of the task, epsilon, the learning rate and the number of ants at the start, so these
             can only change in all worlds that are still running.
@@ -473,7 +473,11 @@ class Interventions:
         return self._streams[w][1]
 
     def world(self, w: int = 0) -> World:
-        """Return the world in which later episodes of world number `w` start."""
+        """Return the world in which later episodes of world number `w` start.
+
+        >>> Interventions(colony).world().ranges
+        (10, 18, 53)
+        """
         first, grid, start = self._first[w], self.colony.grid, self.starts[w]
         trails, ants = grid.index(first.trails[:, :3]), grid.index(first.ants[:, :3])
         foods, queens = (np.flatnonzero(start & _CONTENT == what) for what in (FOOD, QUEEN))
@@ -489,7 +493,14 @@ class Interventions:
         )
 
     def begin_episode(self) -> None:
-        """End the present episode, if any, and start the next one; see `Colony.begin_episode`."""
+        """End the present episode, if any, and start the next one; see `Colony.begin_episode`.
+
+        >>> change = Interventions(colony)
+        >>> change.apply(SetAnts(10))
+        >>> change.begin_episode()
+        >>> colony.living.sum().item()
+        10
+        """
         colony = self.colony
         if colony.episode >= 0:
             colony.end_episode()

@@ -37,7 +37,7 @@ from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
 from taichi_ants.task.rules.policy import BY_LEVELS, BY_VALUES
 
-ANTS, CELLS, STATES, WORLD = "ants", "cells", "states", "world"
+ANTS, CELLS, STATES, SUMS, WORLD = "ants", "cells", "states", "sums", "world"
 
 
 class Phase(NamedTuple):
@@ -45,7 +45,8 @@ class Phase(NamedTuple):
 
     It must not read values that another chunk writes in the same phase. `do` is a `ti.func` with
     arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place, tick) for CELLS, (c, v, w, tick)
-    for WORLD. For STATES, a range of the states of all tables, they are (c, v, w, first, last).
+    for WORLD. For STATES, a range of the states of all tables, they are (c, v, w, first, last). For
+    SUMS, those of a chunk for a state, with `by_ant` only, they are (c, v, w, chunk, state).
     """
 
     of: str
@@ -145,21 +146,26 @@ def tick_groups(v: Variant) -> Iterator[Group]:
         yield (count, *changes, *(food * v.food_changes))
     yield (Phase(ANTS, learning.observe_and_learn),)
     if v.plans_together:
-        yield (Phase(STATES, learning.join_sums),)
+        yield (join(v),)
         yield (Phase(WORLD, learning.remember_shared),)
+
+
+def join(v: Variant) -> Phase:
+    """Return the phase that joins the sums of chunks."""
+    return Phase(SUMS, learning.join_atomically) if v.by_ant else Phase(STATES, learning.join_sums)
 
 
 def planning_groups(v: Variant) -> Iterator[Group]:
     """Yield the phases of one round of updates from the models that ants share."""
     yield Phase(STATES, learning.apply_sums), Phase(ANTS, learning.draw_pair)
-    yield (Phase(STATES, learning.join_plans),)
+    yield join(v), Phase(STATES, learning.find_errors)
 
 
 def last_groups(v: Variant) -> Iterator[Group]:
     """Yield the phases at the end of a tick."""
     learns: Group = (Phase(STATES, learning.apply_sums),) * v.together
     if v.together and not v.plans_together:
-        learns = (Phase(STATES, learning.join_sums), *learns)
+        learns = (join(v), *learns)
     ends: Group = (Phase(WORLD, life.count), Phase(WORLD, life.end_tick))
     if v.ants_change:  # `end_tick` changes what all phases of ants read
         learns = (*learns, Phase(ANTS, life.update_slots))
@@ -218,7 +224,7 @@ def once(v: Variant, what: Callable[..., None], arguments: Any) -> Callable[...,
 
 @function
 def do_one(phase, c, v, i):
-    """Do a phase for entry i of what all worlds have: an ant, cell or state; or for world i."""
+    """Do a phase for entry i of what all worlds have, such as an ant or a cell; or for world i."""
     w = i
     if ti.static(phase.of == ANTS):
         w = i // c.n_slots
@@ -226,9 +232,13 @@ def do_one(phase, c, v, i):
         w = i // c.size
     elif ti.static(phase.of == STATES):
         w = i // v.n_rows
+    elif ti.static(phase.of == SUMS):
+        w = i // (v.n_rows * c.places)
     running, tick = c.worlds[WorldRow.RUNNING, w], c.worlds[WorldRow.TICKS, w]
     if ti.static(phase.of == STATES):
         phase.do(c, v, w, i - w * v.n_rows, i - w * v.n_rows + 1)
+    elif ti.static(phase.of == SUMS):
+        phase.do(c, v, w, i // v.n_rows, i % v.n_rows)
     elif ti.static(phase.of == ANTS):
         slot = i - w * c.n_slots
         if running == 1 and slot < c.worlds[WorldRow.TOP, w]:
@@ -266,17 +276,23 @@ def by_ant(v: Variant, name: str, contents: memory.Contents, arguments: Any) -> 
     )
 
     @while_compiling
-    def length_of(of: str, numbers: Any) -> Any:
+    def lengths_of(numbers: Any) -> dict[str, Any]:
         number = partial(memory.number_of, contents, numbers)
-        each = {ANTS: "n_slots", CELLS: "size"}
-        in_world = number(each[of]) if of in each else v.n_rows if of == STATES else 1
-        return number("n_worlds") * in_world
+        n_worlds = number("n_worlds")
+        return {
+            ANTS: n_worlds * number("n_slots"),
+            CELLS: n_worlds * number("size"),
+            STATES: n_worlds * v.n_rows,
+            SUMS: n_worlds * number("places") * v.n_rows,
+            WORLD: n_worlds,
+        }
 
     @ti.kernel
     def advance_colony(c: arguments):
+        lengths = lengths_of(c)  # all before the first loop, else a GPU launches more kernels
         for of, phases in ti.static(loops):
             ti.loop_config(block_dim=128)
-            for i in range(length_of(of, c)):
+            for i in range(lengths[of]):
                 colony = memory.view_of(contents, c)
                 for phase in ti.static(phases):
                     do_one(phase, colony, v, i)

@@ -178,7 +178,8 @@ ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food
 
 BY_ANT = "by_ant"  # the schedule of a GPU
 SCHEDULES = "by_world", "by_chunk", BY_ANT
-PLACES = 64  # of sums in a world, so that few ants add to the same place at once
+# Places of sums in a world, at most, and ants for each, so that few add to the same one at once.
+PLACES, ANTS_OF_PLACE = 64, 512
 # The number of slots from which threads share a world: a single world, and each of many.
 _LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
 SORTED_BITS = 16  # of the number of a cell, by which ants are sorted

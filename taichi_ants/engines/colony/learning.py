@@ -8,7 +8,8 @@ would move it.
 Each chunk of ants has its own sums, without atomic operations, unless `v.by_ant`. If a world is one
 chunk, `touched` lists the pairs with updates: their number, then the pairs. Else `touched` marks
 the states with updates, and chunks share the states: each joins the sums of its states into those
-of the world, which come before those of chunks, and applies them.
+of the world, which come before those of chunks, and applies them. With `v.by_ant`, threads join
+them atomically: whole numbers, whose order does not matter, as that of ants.
 """
 
 import taichi as ti
@@ -366,12 +367,38 @@ def join_pair(c, v, entry, joined, found):
                 c.sums_of[SumRow.LATEST, entry],
                 c.sums_of[SumRow.TRANSITION, entry],
             )
-            if ti.static(v.by_ant):
-                latest = ti.cast(c.latest[entry] >> 32, ti.i32)
-                transition = ti.cast(c.latest[entry], ti.i32)
-                c.latest[entry] = 0
             note_transition(c, joined, latest, transition)
         c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
+
+
+@function
+def join_atomically(c, v, w, chunk, row):
+    """Do the same as `join_sums` for a state of one chunk, while threads join those of others."""
+    sums = sums_of_chunk(c, v, chunk)
+    if c.touched[touched_of(v, sums) + row] == 1:
+        c.touched[touched_of(v, sums) + row], c.touched[touched_of(v, w) + row] = 0, 1
+        for pair in range(row * ROW, row * ROW + N_ACTIONS):
+            entry, joined = v.n_pairs * sums + pair, v.n_pairs * w + pair
+            count = c.sums_of[SumRow.COUNT, entry]
+            if count > 0:
+                c.sums_of[SumRow.COUNT, joined] += count
+                c.sums[joined] += c.sums[entry]
+                c.errors[joined] = c.errors[entry]
+                c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
+                if ti.static(v.learner.plans):
+                    ti.atomic_max(c.latest[joined], c.latest[entry])
+                    c.latest[entry] = 0
+
+
+@function
+def transition_of(c, v, entry):
+    """Return the transition of the ant with the highest number that updates a pair."""
+    transition = 0
+    if ti.static(v.by_ant):
+        transition = ti.cast(c.latest[entry], ti.i32)
+    else:
+        transition = c.sums_of[SumRow.TRANSITION, entry]
+    return transition
 
 
 @function
@@ -414,7 +441,7 @@ def sort_touched(c, v, w):
 def remember_pair(c, v, w, pair, entry):
     """Store the joined transition of a pair in the shared model."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
-    transition, group = c.sums_of[SumRow.TRANSITION, entry], group_of_pair(v, pair)
+    transition, group = transition_of(c, v, entry), group_of_pair(v, pair)
     at = memory_of(c, v, w * v.n_groups + group)
     model.remember(memory, at, pair - group * v.n_numbers, transition)
 
@@ -423,7 +450,10 @@ def remember_pair(c, v, w, pair, entry):
 def apply_sums(c, v, w, first, last):
     """Update the shared values of a world by the joined sums of a range of states."""
     each_updated(c, v, w, first, last, apply_pair)
-    if ti.static(not v.in_chunks):
+    if ti.static(v.by_ant):
+        for row in range(first, last):
+            c.touched[touched_of(v, w) + row] = 0
+    elif ti.static(not v.in_chunks):
         c.touched[touched_of(v, w)] = 0
 
 
@@ -438,6 +468,8 @@ def apply_pair(c, v, w, pair, entry):
     c.q[value] = c.q[value] + rate * error
     note_best_actions(c, value)
     c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
+    if ti.static(v.by_ant and v.learner.plans):
+        c.latest[entry] = 0
 
 
 @function
@@ -475,16 +507,15 @@ def draw_pair(c, v, w, chunk, ant, tick):
 
 
 @function
-def join_plans(c, v, w, first, last):
-    """Join the pairs that ants drew for planning, with their errors by the present table."""
-    join_sums(c, v, w, first, last)
+def find_errors(c, v, w, first, last):
+    """Set the joined sums of the pairs that ants drew by their errors by the present table."""
     each_updated(c, v, w, first, last, find_error)
 
 
 @function
 def find_error(c, v, w, pair, entry):
     """Compute the error of a pair that ants drew, and set its joined sums."""
-    seen = c.sums_of[SumRow.TRANSITION, entry]
+    seen = transition_of(c, v, entry)
     reward, terminated = model.reward_of(seen), model.terminated_of(seen)
     error = error_of(c, v, w, pair, reward, terminated, model.next_state_of(seen), -1)
     c.errors[entry] = error

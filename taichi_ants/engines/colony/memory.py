@@ -5,10 +5,8 @@ each type of numbers, in which all arrays of this type follow each other. The fi
 kernels read as numbers: those of the model, the place of each array, and its shape.
 """
 
-from functools import cache
 from typing import Any, NamedTuple
 
-import taichi as ti
 from taichi.lang.impl import expr_init, subscript
 
 from taichi_ants.kernel_functions import Named, while_compiling
@@ -67,21 +65,3 @@ def view_of(contents: Contents, memories: Any) -> Named:
         shape = tuple(known[f"{name}.{axis}"] for axis in range(ndim))
         known[name] = _Held(getattr(memories, kind), known[f"{name}.place"], shape)
     return Named(known.__getitem__)
-
-
-@cache
-def copies(kind: str) -> tuple[Any, Any]:
-    """Return kernels that copy an array into a memory, from a place on, and out of it."""
-    numbers = ti.types.ndarray(dtype=getattr(ti, kind), ndim=1)
-
-    @ti.kernel
-    def copy_in(memory: numbers, place: ti.i32, array: numbers):
-        for i in range(array.shape[0]):
-            memory[place + i] = array[i]
-
-    @ti.kernel
-    def copy_out(memory: numbers, place: ti.i32, array: numbers):
-        for i in range(array.shape[0]):
-            array[i] = memory[place + i]
-
-    return copy_in, copy_out

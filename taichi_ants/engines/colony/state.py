@@ -18,6 +18,7 @@ from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
+    ANTS_OF_PLACE,
     BARRIER_SIZE,
     BY_ANT,
     COLUMNS,
@@ -92,15 +93,15 @@ def _view_of(array: Array) -> property:
         shape = len(state.seeds), state.sizes[array.per]
         entries = state.arrays.get(array.name, state.arrays.get(array.instead))
         if entries is None or entries.size != math.prod(shape):
-            entries = np.zeros(shape)
+            entries = np.zeros(shape, array.dtype)
         entries = entries.reshape(shape)
         return entries.astype(array.shown_as) if array.shown_as else entries
 
     kind = np.dtype(array.shown_as or array.dtype)
     places = {ANT: "capacity", NEST: "nests", CELL: "grid.size"}.get(array.per, array.per)
-    about = array.doc or array.words.capitalize()
+    about = array.doc or f"{array.words.capitalize()}{f', in {array.unit}' if array.unit else ''}"
     return property(
-        read, doc=f"{about}: {kind} (W, {places}){'' if array.shown_as else ', a view'}."
+        read, doc=f"{about}, {kind} (W, {places}){'' if array.shown_as else ', a view'}."
     )
 
 
@@ -122,15 +123,30 @@ class ColonyState:
         ready: bool (W,), whether an episode has begun, and each change of it was completed.
         delivered: int64 (W,), food items delivered in previous episodes.
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
-
-    Properties show the arrays in `layout.COLUMNS`, as writable views or as copies; those (W,
-    capacity) hold what belongs to the last ant in the slot. Arrays of features are 0 in colonies
-    without the feature.
     """
 
     if TYPE_CHECKING:  # the views of arrays, see below
-
-        def __getattr__(self, name: str) -> np.ndarray: ...
+        _stages: np.ndarray
+        actions: np.ndarray
+        ages: np.ndarray
+        carried: np.ndarray
+        carrying: np.ndarray
+        caste_deliveries: np.ndarray
+        castes: np.ndarray
+        cells: np.ndarray
+        events: np.ndarray
+        executed: np.ndarray
+        food_kinds: np.ndarray
+        headings: np.ndarray
+        idle: np.ndarray
+        kinds: np.ndarray
+        nests: np.ndarray
+        next_actions: np.ndarray
+        numbers: np.ndarray
+        paper_states: np.ndarray
+        states: np.ndarray
+        stimuli: np.ndarray
+        thresholds: np.ndarray
 
     def __init__(
         self,
@@ -142,18 +158,19 @@ class ColonyState:
         capacity: int | None = None,
         start: Start = "nest",
         ends_at_delivery: bool = False,
-        sharing: str = "shared",
+        sharing: Sharing = "shared",
         q_values: np.ndarray | None = None,
         threads: int | None = None,
         *,
         arch: str | None = None,
-        schedule: str | None = None,
+        schedule: Literal["by_world", "by_chunk", "by_ant"] | None = None,
     ) -> None:
         self.task = task = arguments.checked_task(task, "a colony", SUPPORTS)
         self.capacity = arguments.checked_capacity(task, ants, capacity, start, ends_at_delivery)
         self.ants, self.start, self.ends_at_delivery = int(ants), start, bool(ends_at_delivery)
         check_one_of("sharing", sharing, SHARINGS)
-        self.sharing, self.learns = sharing, sharing != "frozen"
+        self.sharing: str = sharing
+        self.learns = sharing != "frozen"
         given = arguments.checked_training(training, task, sharing, q_values is not None)
         self.has_training, self.training = given is not None, given or _NO_TRAINING
         self.is_given_actions = task.needs_table and not self.has_training
@@ -176,7 +193,8 @@ class ColonyState:
         self._shared_rows = model.n_rows if sharing == "shared" else 0
         self.chunks = 1
         if self.schedule != "by_world":
-            places = PLACES if self.schedule == BY_ANT else running.threads
+            places = min(PLACES, -(-self.capacity // ANTS_OF_PLACE))
+            places = places if self.schedule == BY_ANT else running.threads
             sizes = len(self.seeds), self.capacity, self._shared_rows * ROW, places
             self.chunks = most_chunks(*sizes)
         self.arrays = _no_arrays(self.schedule)
@@ -212,23 +230,23 @@ class ColonyState:
 
     running = property(
         lambda colony: colony.arrays["worlds"][WorldRow.RUNNING] == 1,
-        doc="Whether the episode of each world is still running: bool (W,).",
+        doc="Whether the episode of each world is still running, bool (W,).",
     )
     episode_ticks = property(
         lambda colony: colony.arrays["worlds"][WorldRow.TICKS],
-        doc="Ticks since the episode of each world began: int32 (W,), a view.",
+        doc="Ticks since the episode of each world began, int32 (W,), a view.",
     )
     deliveries = property(
         lambda colony: colony.arrays["worlds"][WorldRow.DELIVERIES],
-        doc="Deliveries of the present episode: int32 (W,), a view.",
+        doc="Deliveries of the present episode, int32 (W,), a view.",
     )
     living = property(
         lambda colony: colony._stages == Stage.LIVING,
-        doc="Whether an ant lives in each slot: bool (W, capacity).",
+        doc="Whether an ant lives in each slot, bool (W, capacity).",
     )
     queen_cells = property(
         lambda colony: colony._of_nests(NestRow.QUEEN_CELL),
-        doc="Flat indices of the cells of queens: int32 (W, nests), a view.",
+        doc="Flat indices of the cells of queens, int32 (W, nests), a view.",
     )
     streams = _view_of(Array("streams", ANT, "u8", doc="State of the random stream"))
 
@@ -300,7 +318,12 @@ class ColonyState:
         return rewards
 
     def outcome(self) -> ColonyEpisodes:
-        """Return the results of the episode so far, arrays (1, W); AntsError if a value is NaN."""
+        """Return the results of the episode so far, arrays (1, W); AntsError if a value is NaN.
+
+        >>> colony.tick(100)
+        >>> colony.outcome().ticks.item()
+        100
+        """
         self._check_finite()
         return self._results()
 
@@ -317,7 +340,11 @@ class ColonyState:
         return ColonyEpisodes(**copies, seeds=self.seeds)
 
     def snapshot(self, world: int = 0) -> Snapshot:
-        """Return the present state of world number `world`; arrays are copies."""
+        """Return the present state of world number `world`; arrays are copies.
+
+        >>> colony.snapshot().ant_cells.shape
+        (16,)
+        """
         self._check_begun()
         w = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
         slots, levels = self.living[w], {}
@@ -713,9 +740,13 @@ class ColonyState:
         *,
         arch: str | None = None,
     ) -> State:
-        """Return a colony that `save` wrote.
+        """Return a colony that `save` wrote; `threads` and `arch` are those of `train`.
 
         AntsError if the file cannot be used, or its learner or observation is not registered.
+
+        >>> colony.save("colony.npz")
+        >>> Colony.load("colony.npz") == colony
+        True
         """
         running = runtime.start(threads, arch)  # first: its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):

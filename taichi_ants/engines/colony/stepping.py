@@ -24,9 +24,9 @@ _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _SORT_SECONDS = 0.25  # about the time in which Taichi loads the kernel that sorts
 _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # checks of a thread at a barrier, which take at least half a second
-# Trials of another number of threads: seconds in a launch, the share of all time, and the log of
-# the gain in speed for which the number changes.
-_TRIAL_SECONDS, _TRIAL_SHARE, _LEAST_GAIN = 0.002, 0.03, 0.02
+# Trials of another number of threads: seconds in a launch, so that waking threads takes little of
+# them; the share of all time; and the log of the gain in speed for which the number changes.
+_TRIAL_SECONDS, _TRIAL_SHARE, _LEAST_GAIN = 0.01, 0.03, 0.02
 
 
 class ThreadChoice:
@@ -99,6 +99,10 @@ class TickingColony(ColonyState):
 
         Raises:
             AntsError: A world is not allowed.
+
+        >>> colony.begin_episode()
+        >>> colony.ticks
+        0
         """
         fresh = copy.copy(self)
         fresh.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
@@ -185,6 +189,12 @@ class TickingColony(ColonyState):
         Actions are whole numbers 0 to 4 (W, capacity): left, forward, right, pick up, give. Those
         of vacant slots and of worlds whose episode has ended are ignored. AntsError if no episode
         has started, the colony has a training, or an action is not allowed.
+
+        >>> given = Colony(worlds.paper(), ants=4, sharing="frozen")
+        >>> given.begin_episode()
+        >>> given.act(np.ones((1, 4), int))  # forward
+        >>> given.rewards.tolist()
+        [[1, -1, -1, 0]]
         """
         self._check_begun()
         if not self.is_given_actions:
@@ -200,7 +210,12 @@ class TickingColony(ColonyState):
         self._advance(1)
 
     def end_episode(self) -> None:
-        """End the episode: save random streams for the next one, and decay epsilon and the rate."""
+        """End the episode: save random streams for the next one, and decay epsilon and the rate.
+
+        >>> colony.end_episode()
+        >>> colony.epsilon
+        0.099
+        """
         self._check_finite()
         self._keep_streams()
         epsilon = self.training.next_epsilon(self.epsilon)

@@ -2,29 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.engines.layout import EXTRA_CELLS, Command, join, split, unpack_cells
+from taichi_ants.engines.layout import (
+    EXTRA_CELLS,
+    TRUNCATED,
+    Command,
+    join,
+    split,
+    unpack_cells,
+)
 from taichi_ants.engines.runs.engine import laid_out
+from taichi_ants.features import used_by
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.records import Snapshot
 from taichi_ants.task import Task
 from taichi_ants.worlds.world import World
 
-_STEPS_OF_LAUNCH = 1 << 23  # of all ants in a rollout; a launch cannot be interrupted
-# The arrays with one int32 per ant; the first ones are what environments show of a step.
-SHOWN = "states", "paper_states", "results", "reasons", "deliveries"
+# Steps of all ants in a launch of a rollout, which cannot be interrupted; and on a GPU, numbers of
+# their observations, because indices have 32 bits.
+_STEPS_OF_LAUNCH, _NUMBERS_ON_GPU = 1 << 23, 1 << 28
+# The arrays with one int32 per ant, the results of `step_alone` first.
+_RESULTS = "states", "paper_states", "results", "reasons", "deliveries", "rewards_of"
 _OF_ANTS = (
-    *SHOWN,
+    *_RESULTS,
+    *("taken", "commands"),
     *("start_cells", "start_headings", "worlds", "ant_cells", "headings", "carries", "carried"),
-    *("steps", "changed", "commands", "final_states", "final_paper_states", "final_deliveries"),
+    *("steps", "changed", "final_states", "final_paper_states", "final_deliveries"),
 )
+_MOST_NUMBERS = 64  # that a step reads
+_SINGLE = False, 0  # the launch of a step, see `_launch`
+_STEP = int(Command.STEP)
 
 
 class BatchedEnvironments:
@@ -37,12 +51,12 @@ class BatchedEnvironments:
 
     Attributes:
         arrays: Arrays by name, with one row per ant, int32 if no other type is named. States:
-            paper_states, states. Results of the last step: rewards_of float64, reasons (`Reason`),
-            and results, see `layout.TERMINATED`; of a rollout, only whether the episode has ended.
-            Last states of an episode that a step has restarted: final_states, final_paper_states.
-            Deliveries of the episode, and of one that a step has restarted: deliveries,
-            final_deliveries.
-        shown: int32 (5, n), those arrays whose names are `SHOWN`.
+            paper_states, states. Results of the last step: rewards_of, reasons (`Reason`), and
+            results, see `layout.TERMINATED`; of a rollout, only whether the episode has ended. So
+            has one that has not begun. Last states of an episode that a step has restarted:
+            final_states, final_paper_states. Deliveries of the episode, and of one that a step has
+            restarted: deliveries, final_deliveries.
+        alone: int32 (6,), the results of a single ant as a memoryview, see `step_alone`.
     """
 
     def __init__(
@@ -58,18 +72,23 @@ class BatchedEnvironments:
         own = np.empty((n, size + EXTRA_CELLS), np.int32)
         own[:, :size] = common["world"].reshape(-1, size)[number]
         own[:, size:] = size, -1  # no cell has changed, see `step.restore`
-        shared = {
-            name: common.pop(name) for name in ("compass", "rewards", "closer", "world", "trails")
-        }
         of_ants = {name: np.zeros(n, np.int32) for name in _OF_ANTS} | {"worlds": number}
-        of_ants["after_end"] = np.zeros(1, np.int32)
-        self._joined = join(shared | of_ants)
-        self._others = {
-            "cells": np.concatenate([shared["world"], own.reshape(-1)]),
-            "taken": np.zeros(n, np.int64),
-            "random_states": np.zeros(n, np.uint64),
-            "rewards_of": np.zeros(n),
+        of_ants["results"][:] = TRUNCATED
+        shared = {
+            name: common.pop(name) for name in ("compass", "rewards", "closer", "trails", "world")
         }
+        # A launch takes 0.4 microseconds for each array and 0.13 for each number, so a step has a
+        # single array. The numbers are first, and random states have an even place.
+        self._joined = join(
+            {
+                "numbers": np.zeros(_MOST_NUMBERS, np.int32),
+                "random_states": np.zeros(2 * n, np.int32),
+                **of_ants,
+                "after_end": np.full(1, Command.WAIT, np.int32),
+                **shared,
+                "own": own,
+            }
+        )
         self._numbers = {
             **common,
             "n": n,
@@ -79,22 +98,24 @@ class BatchedEnvironments:
             "delivery_terminates": int(ends == "terminates"),
             "delivery_truncates": int(ends == "truncates"),
             # The cells of all worlds, then the cells of each ant.
+            "cells_at": self._joined["world_at"],
             "shared_cells": shared["world"].size,
         }
         self._view()
 
     def _view(self) -> None:
         """Make the views of the memory, and the arguments of kernels."""
-        self.arrays = split(self._joined) | self._others
-        first = self._joined[f"{SHOWN[0]}_at"]
-        self.shown = self._joined["memory"][first : first + len(SHOWN) * self.n].reshape(-1, self.n)
-        self._arguments = {**self._joined, **self._others, **self._numbers}
-        # A launch takes 0.15 microseconds for each number, so those of a step are in an array.
+        self.arrays, memory = split(self._joined), self._joined["memory"]
+        self.arrays["random_states"] = self.arrays["random_states"].view(np.uint64)
+        self.arrays["cells"] = memory[self._numbers["cells_at"] :]
+        self._given = memoryview(memory[self._joined["taken_at"] :][:2])  # "taken", "commands"
+        self.alone = memoryview(memory[self._joined[f"{_RESULTS[0]}_at"] :][: len(_RESULTS)])
+        self._arguments = {**self._joined, **self._numbers}
         numbers = {name: one for name, one in self._arguments.items() if isinstance(one, int)}
-        self._names = tuple(numbers)
-        self._of_steps = {**self._arguments, "numbers": np.array(list(numbers.values()), np.int32)}
-        for name in numbers:
-            del self._of_steps[name]
+        self._names, self.arrays["numbers"][: len(numbers)] = tuple(numbers), [*numbers.values()]
+        # Besides them, kernels for lone ants read only the probabilities of features.
+        read = {f"{name}_below" for one in used_by(self.task) for name in one.probabilities}
+        self._of_steps = {name: self._arguments[name] for name in ("memory", *sorted(read))}
 
     def seed(self, seeds: Sequence[int], which: np.ndarray) -> None:
         """Set the seeds of some ants, int (k,): new random streams and start cells."""
@@ -117,7 +138,22 @@ class BatchedEnvironments:
         self.arrays["commands"][:] = commands
         self.arrays["after_end"][0] = after_end
         with runtime.alone:
-            self._launch(False, 0).repeat(self._of_steps)
+            self._launch(*_SINGLE).repeat(self._of_steps)
+
+    def step_alone(self, action: int) -> list[int]:
+        """Let the only ant, whose episode has begun, act; return its `alone` after the step.
+
+        These are its state and paper state, its result as in `arrays`, its reason, the number of
+        deliveries, and its reward.
+        """
+        self._given[0], self._given[1] = action, _STEP
+        runtime.alone.acquire()  # `with` takes twice as long
+        try:
+            launch = self._launches.get(_SINGLE) or self._launch(*_SINGLE)
+            launch.repeat(self._of_steps)
+        finally:
+            runtime.alone.release()
+        return self.alone.tolist()
 
     def rollout(
         self,
@@ -126,8 +162,10 @@ class BatchedEnvironments:
         begins: np.ndarray,
         after_end: Command,
         policy: tuple[np.ndarray, np.ndarray, float] | None,
-    ) -> None:
-        """Take several steps, and record each.
+    ) -> Callable[[str], np.ndarray]:
+        """Take several steps, and record each; return a function that returns rows by name.
+
+        On a GPU, results stay there until this function is called with their name.
 
         Args:
             rows: Arrays (steps, n, ...) by name. `taken`, int64, are the actions: given ones or,
@@ -142,16 +180,23 @@ class BatchedEnvironments:
                 each ant, uint64 (n,), and epsilon; or None.
         """
         launch = self._launch(policy is not None, shown[0].size)
+        from taichi_ants.engines.device_memory import copy_out
+        from taichi_ants.engines.launch import check_not_lost
+
         if self._codes is None:
             from taichi_ants.engines.runs.rollout_kernel import CODES_OF_CHUNK, WIDTH
 
             chunks = 1 if runtime.compiles_for_gpu() else -(-self.n // WIDTH)
             self._codes = np.empty(chunks * CODES_OF_CHUNK, np.int64)
-        steps = max(1, _STEPS_OF_LAUNCH // self.n)
+        most = _STEPS_OF_LAUNCH
+        if runtime.compiles_for_gpu():
+            most = _NUMBERS_ON_GPU // shown[0].size
+        steps = max(1, most // self.n)
         values = {
             **self._arguments,
             # As arrays of their own, which many steps read faster.
             **{name: self.arrays[name] for name in ("compass", "rewards", "closer")},
+            "cells": self._arguments.get("cells", self.arrays["cells"]),
             "shown": shown.reshape(-1),
             "codes": self._codes,
         }
@@ -161,27 +206,46 @@ class BatchedEnvironments:
             values |= {"best": best, "choices": choices, "explore_below": below}
         self.arrays["commands"][:] = begins
         self.arrays["after_end"][0] = after_end
+        on_gpu: list[tuple[dict[str, np.ndarray], dict[str, Any]]] = []
         with runtime.alone:
             for first in range(0, len(rows["taken"]), steps):
                 part = {name: one[first : first + steps].reshape(-1) for name, one in rows.items()}
-                launch({**values, **part, "n_steps": len(part["taken"]) // self.n})
-        self.arrays["rewards_of"][:] = rows["rewards_of"][-1]
+                several = {**values, **part, "n_steps": len(part["taken"]) // self.n}
+                on_gpu.append((part, launch.without_outputs(several)))
+
+        def fetch(name: str) -> np.ndarray:
+            for part, outputs in on_gpu:
+                if (copy := outputs.pop(name, None)) is not None:
+                    check_not_lost([copy])
+                    copy_out(copy, part[name])
+            return rows[name]
+
+        last = rows["rewards_of"][-1]
+        if (rewards := on_gpu[-1][1].get("rewards_of")) is not None:
+            copy_out(rewards, last, rewards.shape[0] - self.n)
+        self.arrays["rewards_of"][:] = last
+        return fetch
 
     def _launch(self, follows: bool, width: int) -> Any:
         """Return the `Launch` of a rollout with observations of `width` numbers."""
         if (follows, width) not in self._launches:
             runtime.start()  # configures Taichi before the imports below
-            from taichi_ants.engines.launch import Launch, on_device
+            from taichi_ants.engines.device_memory import on_device
+            from taichi_ants.engines.launch import Launch
             from taichi_ants.engines.runs.rollout_kernel import WIDTH, rollout_kernel
             from taichi_ants.engines.runs.step import Rules
 
             names = () if width else self._names
             form = Rules.of(self.task), follows, width, self.n <= WIDTH, names
-            self._launches[follows, width] = Launch(partial(rollout_kernel, *form))
+            outputs = {"seen", "rewards_of", "result_rows", "final_states", "codes"}
+            kernel_of, changed = partial(rollout_kernel, *form), {"memory", "choices"}
+            launch = Launch(kernel_of, changed, outputs | {"taken"} if follows else outputs)
+            self._launches[follows, width] = launch
             if runtime.compiles_for_gpu() and self._cells_on_gpu is None:
-                self._cells_on_gpu = cells = on_device(self.arrays["cells"])
-                self._arguments["cells"] = self._of_steps["cells"] = cells
-                self._of_steps["numbers"] = on_device(self._of_steps["numbers"])
+                self._cells_on_gpu = on_device(self.arrays["cells"])
+                memory = self._joined["memory"][: self._joined["own_at"]]
+                for arguments in (self._arguments, self._of_steps):
+                    arguments |= {"memory": memory, "cells": self._cells_on_gpu}
         return self._launches[follows, width]
 
     def snapshot(self, number: int) -> Snapshot:
@@ -198,15 +262,16 @@ class BatchedEnvironments:
     def _fetch_cells(self) -> None:
         """Copy the cells from the GPU, if they are there."""
         if self._cells_on_gpu is not None:
+            from taichi_ants.engines.device_memory import copy_out
             from taichi_ants.engines.launch import check_not_lost
 
             check_not_lost([self._cells_on_gpu])
-            self.arrays["cells"][:] = self._cells_on_gpu.to_numpy()
+            copy_out(self._cells_on_gpu, self.arrays["cells"])
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without Taichi's objects, so that copies and pickles work."""
         self._fetch_cells()
-        parts = ("worlds", "task", "n", "_joined", "_others", "_numbers")
+        parts = ("worlds", "task", "n", "_joined", "_numbers")
         return {name: getattr(self, name) for name in parts}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

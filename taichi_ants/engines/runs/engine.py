@@ -45,6 +45,7 @@ _WORKSPACE_BYTES = 256 * 2**20
 _MOST_NUMBERS = 2**30  # in one array of a launch, because kernels use 32-bit indices
 _RUNS_ON_GPU = 2**16  # in parallel, each of which takes a step in about
 _STEP_NS_ON_GPU = 32_000
+TRACED = {"trace", "trace_chances", "trace_errors", "trace_tables"}  # arrays of `Runs.record`
 MAX_ROLLOUT_STEPS = 1_000_000  # that a launch records
 
 
@@ -211,7 +212,8 @@ class Runs:
         8, see `Learner.memory_for`.
         """
         # Imported here, because Taichi must be configured first; see `runtime`.
-        from taichi_ants.engines.launch import Launch, on_device
+        from taichi_ants.engines.device_memory import room_for
+        from taichi_ants.engines.launch import Launch
         from taichi_ants.engines.runs.kernels import LANES, run_kernel
         from taichi_ants.engines.runs.step import Rules
 
@@ -222,7 +224,8 @@ class Runs:
         several = 2 * len(self) >= LANES * settings.threads and not traced
         several &= self.learner is None or self.learner.td_error is not None
         lanes = LANES if several and not runtime.compiles_for_gpu() else 1
-        launch = Launch(partial(run_kernel, Rules.of(task), self.learner, traced, lanes))
+        kernel = partial(run_kernel, Rules.of(task), self.learner, traced, lanes)
+        launch = Launch(kernel, vars(state).keys() | TRACED, ["outcomes"])
         falls = task.evaporation_in_training if self.learner else task.evaporation_in_evaluation
         common = {**laid_out([self.world], task, falls), "max_steps": self.max_steps}
 
@@ -230,7 +233,7 @@ class Runs:
         def cells_of(n: int) -> Any:
             """Return room for the cells of n runs; a GPU need not copy it."""
             cells = np.empty(n * (common["size"] + EXTRA_CELLS), np.int32)
-            return on_device(cells) if n > 0 and runtime.compiles_for_gpu() else cells
+            return room_for(cells) if n > 0 and runtime.compiles_for_gpu() else cells
 
         def launch_part(runs: slice, episodes: slice, **arrays: Any) -> None:
             n = runs.stop - runs.start

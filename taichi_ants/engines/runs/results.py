@@ -34,8 +34,10 @@ class TrainingResult(Record, Tidy):
     Two results are equal if everything except `seconds` is equal.
 
     Attributes:
-        returns, steps, deliveries: int32 (C, S, E), for each episode the undiscounted sum of
-            rewards, the number of steps, and 1 if the ant delivered, else 0.
+        world, configs, seeds, max_steps, task: The arguments of `train`; `configs` is a tuple.
+        returns: int32 (C, S, E), the undiscounted sum of the rewards of each episode.
+        steps: int32 (C, S, E), its number of steps.
+        deliveries: int32 (C, S, E), 1 if the ant delivered in it, else 0.
         seconds: The time of the last training without compilation: CPU seconds of all threads, or
             wall-clock seconds on a GPU.
         state: The state of the runs after the last episode, with leading axes (C, S).
@@ -104,7 +106,12 @@ class TrainingResult(Record, Tidy):
 
     @classmethod
     def load(cls, path: PathLike) -> TrainingResult:
-        """Return a result that `save` wrote; its learners need not be registered."""
+        """Return a result that `save` wrote; its learners need not be registered.
+
+        >>> result.save("result.npz")
+        >>> TrainingResult.load("result.npz") == result
+        True
+        """
         with _KIND.reading(path) as (arrays, facts):
             task = Task.from_dict(facts["task"])
             outcomes: dict[str, Any] = {name: arrays[name] for name in OUTCOMES}
@@ -123,9 +130,12 @@ class TrainingResult(Record, Tidy):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rollouts(Record, Tidy):
-    """The result of `evaluate`: int32 arrays of shape q_values.shape[:-2] + (rollouts,).
+    """The result of `evaluate`.
 
-    `seeds` has the seed of each table, in the order of the last of its leading axes.
+    Attributes:
+        returns, steps, deliveries: As in `TrainingResult`, but int32 (..., rollouts), where ... are
+            the leading axes of the tables.
+        seeds: The seed of each table, in the order of the last of the leading axes.
 
     >>> evaluate(worlds.paper(), result.q_values, seeds=range(3), rollouts=5).steps.shape
     (1, 3, 5)
@@ -178,11 +188,13 @@ class Trace(Record):
         steps: Number of the step in its episode, from 0.
         cells: int32 (n, 3), cube coordinates in normal form.
         headings: Heading of the ant, 0 to 5.
-        paper_states, states: The paper's state, see `taichi_ants.task.states`; state index, which
-            is the same with the paper's observation.
-        actions, rewards, events: Action, 0 to 4; its reward; its result, see `Event`.
+        paper_states: The paper's state, see `taichi_ants.task.states`.
+        states: The state index; with the paper's observation, that of the paper's state.
+        actions: Action, 0 to 4.
+        rewards: Its reward.
+        events: Its result, an `Event`.
         executed: Action as executed, which differs from the chosen one only if actions slip.
-        next_paper_states, next_states: The paper's state and state index after the step.
+        next_paper_states, next_states: As above, after the step.
         terminated: bool (n,), whether the learner treated the next state as terminal.
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), the TD error of the step; None without learning.

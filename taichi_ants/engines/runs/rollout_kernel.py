@@ -13,7 +13,7 @@ from typing import Any
 
 import taichi as ti
 
-from taichi_ants.arithmetic.random_bits import advance, bits_of
+from taichi_ants.arithmetic.random_bits import advance, bits_of, high_word, joined, low_word
 from taichi_ants.engines.launch import has_guards
 from taichi_ants.engines.layout import EXTRA_CELLS, TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.step import (
@@ -83,7 +83,8 @@ def rollout_kernel(
         """Let ant i take steps from row `first` on; its first code is at `place`."""
         own, origin = a.shared_cells + i * (a.size + EXTRA_CELLS), a.worlds[i] * a.size
         ant = Ant(origin=origin, cell=a.ant_cells[i], heading=a.headings[i])
-        ant.carries, ant.random_state = a.carries[i], a.random_states[i]
+        ant.carries = a.carries[i]
+        ant.random_state = joined(a.random_states[2 * i], a.random_states[2 * i + 1])
         if ti.static(deposit == FADING):
             ant.carried = a.carried[i]
         paper_state, state = a.paper_states[i], a.states[i]
@@ -157,7 +158,9 @@ def rollout_kernel(
             else:
                 a.codes[place + t * _STRIDE] = code
         a.ant_cells[i], a.headings[i] = ant.cell, ant.heading
-        a.carries[i], a.random_states[i] = ant.carries, ant.random_state
+        a.carries[i] = ant.carries
+        a.random_states[2 * i] = ti.cast(low_word(ant.random_state), ti.i32)
+        a.random_states[2 * i + 1] = ti.cast(high_word(ant.random_state), ti.i32)
         if ti.static(deposit == FADING):
             a.carried[i] = ant.carried
         a.paper_states[i], a.states[i] = paper_state, state

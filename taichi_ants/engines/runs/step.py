@@ -94,12 +94,12 @@ class Part:
 def parts_of(a: Any, numbers: tuple[str, ...]) -> Named:
     """Return the arguments of a kernel, and the arrays that `layout.join` has joined, by name.
 
-    The array `numbers` has the arguments of these names.
+    The first entries of the joined arrays are the arguments of the names `numbers`.
     """
 
     def read(name: str) -> Any:
         if name in numbers:
-            return subscript(None, a.numbers, numbers.index(name))
+            return subscript(None, a.memory, numbers.index(name))
         if hasattr(a, name):
             return getattr(a, name)
         return Part(a.memory, read(f"{name}_at"))

@@ -186,10 +186,13 @@ def rollout(
     task: Task | None = None,
     epsilon: float = 0.0,
 ) -> Trace:
-    """Return the trace of one episode with a table (n_states, 5): rollout `number` of the seed.
+    """Return the trace of one episode in which an ant follows a fixed policy.
 
-    Instead of the table, you can pass the `TrainingResult` of a single run, or a `Policy`. Other
-    arguments and errors are those of `evaluate`. Numbers start at 0.
+    Args:
+        q_values: float (n_states, 5), action values; or the `TrainingResult` of a single run, or a
+            `Policy`.
+        number: The number of the rollout of the seed, as `evaluate` counts them, from 0.
+        world, seed, max_steps, task, epsilon: As in `evaluate`, whose errors it also raises.
 
     >>> rollout(worlds.paper(), result.q_values[0, 0]).headings[0].item()
     0
@@ -224,8 +227,10 @@ def trace_training(
 ) -> Trace:
     """Return the trace of the first episodes of one training run, with the Q table after each step.
 
-    Arguments and errors are those of `train`; episodes * max_steps * n_states is limited to 12.8
-    million.
+    Args:
+        config: The configuration of the learner.
+        world, seed, episodes, max_steps, task: As in `train`, whose errors it also raises. The
+            product of episodes, steps and states is limited to 12.8 million.
 
     >>> trace_training(worlds.paper(), config, max_steps=50).tables.shape
     (50, 128, 5)

@@ -87,7 +87,7 @@ class Observation:
 
     @property
     def parts(self) -> tuple[int, ...]:
-        """The number of values of each part of a state index: `shape`, or (n_states,)."""
+        """The number of values of each part of a state index, `shape` or (n_states,)."""
         return self.shape or (self.n_states,)
 
     @property
@@ -127,6 +127,11 @@ def register(observation: Observation) -> Observation:
 
     Raises AntsError if the name is not an identifier or belongs to a built-in observation, a field
     does not have the right form, or a state index is outside its range.
+
+    >>> def loads(view):
+    ...     return view.carries
+    >>> task.observations.register(Observation("loads", 2, loads)).name
+    'loads'
     """
     expect("observation", observation, Observation)
     name, encode = observation.name, observation.encode

@@ -60,10 +60,10 @@ def test_drawn_colonies_have_the_recorded_hashes(group):
         assert record.of_colony(drawn, BY_ANT) == record.recorded()[1][name]
 
 
-@pytest.mark.parametrize(("ants", "places"), [(8, 3), (1000, 1), (1000, 64)])
-def test_threads_add_to_the_same_sums_in_any_order(ants, places, monkeypatch):
+@pytest.mark.parametrize(("ants", "ants_of_place"), [(8, 3), (1000, 1000), (1000, 16)])
+def test_threads_add_to_the_same_sums_in_any_order(ants, ants_of_place, monkeypatch):
     """Also many ants, all into one place."""
-    monkeypatch.setattr(state, "PLACES", places)
+    monkeypatch.setattr(state, "ANTS_OF_PLACE", ants_of_place)
     colony, expected = made(ants=ants), made("by_world", ants)
     for one in (colony, expected):
         one.tick(40)

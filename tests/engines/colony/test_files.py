@@ -67,7 +67,11 @@ def test_wrong_facts(kept, tmp_path, changes, said) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["dyna_q", *(pytest.param(n, marks=pytest.mark.slow) for n in ("double_q", "sarsa_lambda"))],
+    [
+        "dyna_q",
+        pytest.param("double_q", marks=pytest.mark.long),
+        pytest.param("sarsa_lambda", marks=pytest.mark.slow),
+    ],
 )
 def test_what_was_saved_goes_on_bit_for_bit(name, tmp_path) -> None:
     """At many moments of its life: a model, further tables, or traces are part of it."""

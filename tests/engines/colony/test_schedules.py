@@ -19,10 +19,7 @@ from taichi_ants.task import Field, Life, Pheromone, Task
 
 LIVELY = Task(
     pheromone=Pheromone("exponential", half_life=20, diffusion=0.2, deposit="add"),
-    fields={
-        "home": Field(deposited_when="without_food", deposit="fading"),
-        "wide": Field(deposited_when="always", diffusion=0.3),
-    },
+    fields={"home": Field(deposited_when="without_food", deposit="fading", diffusion=0.3)},
     homing_cue="home",
     evaporation_in_training=True,
     life=Life(births=True, lifespan=60, regrowth=2, pile_move_interval=9),

@@ -46,7 +46,7 @@ NOISY = [
     ("sarsa", "ants", "set", "softmax", NOISE),
     pytest.param("q_learning", "paper", "fading", "softmax", NO_NOISE, marks=pytest.mark.slow),
     pytest.param("expected_sarsa", "paper", "add", "greedy", NOISE, marks=pytest.mark.slow),
-    pytest.param("sarsa_lambda", "trail_levels", "set", "greedy", "slip", marks=pytest.mark.slow),
+    pytest.param("sarsa_lambda", "trail_levels", "set", "greedy", "slip", marks=pytest.mark.long),
     pytest.param(
         *("dyna_q", "six_cells", "set", "softmax", "misread"), marks=pytest.mark.optimised
     ),

@@ -80,7 +80,10 @@ def check_equal(ants: BatchedEnvironments, i: int, colony: ReferenceColony, worl
             assert now.trail[place] == colony.world.trail.level(cell)
 
 
-@pytest.mark.parametrize("kernel", KERNELS, ids="-".join)
+MARKED = [pytest.param(one, marks=[pytest.mark.long] * (k % 2)) for k, one in enumerate(KERNELS)]
+
+
+@pytest.mark.parametrize("kernel", MARKED, ids="-".join)
 def test_each_step_equals_the_reference(kernel):
     rng = np.random.default_rng(KERNELS.index(kernel))
     delivered = 0
