@@ -22,6 +22,7 @@ from taichi_ants import (
     trace_training,
     train,
 )
+from taichi_ants.engines.runs import engine
 from taichi_ants.settings import declared
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import Event
@@ -191,8 +192,9 @@ def test_whole_trainings_of_a_mixed_sweep():
         ),
     ],
 )
-def test_many_runs_equal_single_ones(learner, observation, deposit, choice, noise):
+def test_many_runs_equal_single_ones(learner, observation, deposit, choice, noise, monkeypatch):
     """A task takes many runs together, and more of them than it has lanes for."""
+    monkeypatch.setattr(engine, "_FEW_STEPS", 0)  # else the single ones could use the same kernel
     seeds = range(-3, 20 * runtime.start().threads)
     drawn = 0
     for number in range(4):
