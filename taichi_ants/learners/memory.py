@@ -33,6 +33,9 @@ class LearnerArrays(NamedTuple):
 # table + k * n_states * ROW.
 At = ti.types.struct(table=ti.i32, floats=ti.i32, integers=ti.i32)
 
+# The mask shows the compiler that `row + a` does not overflow, which saves two instructions each.
+_ROWS = 2**31 - ROW
+
 # One step of an ant, with state indices. The next action is -1 if none was drawn. A step is
 # `truncated` if the episode ends with it without terminating.
 Transition = ti.types.struct(
@@ -71,7 +74,7 @@ def read_rates(kind: type[Hyperparameters]) -> Callable[..., Any]:
 @ti.func
 def values_of(q: ti.template(), table, state):
     """Return the five action values of a state in the table at offset `table`."""
-    row = table + state * ROW
+    row = (table + state * ROW) & _ROWS
     return ti.Vector([q[row + a] for a in ti.static(range(N_ACTIONS))])
 
 
@@ -97,17 +100,33 @@ def guarded(td_error: Any) -> Callable[..., object]:
     return checked
 
 
-def learn_by(td_error: Any) -> Callable[..., object]:
-    """Return the `learn` of a learner without memory that updates by this TD error."""
+@functools.cache
+def error_function(td_error: Any) -> Callable[..., Any]:
+    """Return a `ti.func` (memory, table, step, rates) of the TD error of a step.
+
+    It returns the place of the updated value, the value, and the error.
+    """
     error_of = guarded(td_error)
 
     @ti.func
-    def learn(memory: ti.template(), at, step, rates, random_state):
-        entry = at.table + step.state * ROW + step.action
+    def error(memory: ti.template(), table, step, rates):
+        entry = table + step.state * ROW + step.action
         value = memory.q[entry]
         discount = discount_of(rates, step.terminated)
-        next_values = values_of(memory.q, at.table, step.next_state)
+        next_values = values_of(memory.q, table, step.next_state)
         error = error_of(value, step.reward, discount, next_values, step.next_action, rates.epsilon)
+        return entry, value, error
+
+    return error
+
+
+def learn_by(td_error: Any) -> Callable[..., object]:
+    """Return the `learn` of a learner without memory that updates by this TD error."""
+    error_of = error_function(td_error)
+
+    @ti.func
+    def learn(memory: ti.template(), at, step, rates, random_state):
+        entry, value, error = error_of(memory, at.table, step, rates)
         memory.q[entry] = value + rates.learning_rate * error
         return error, random_state
 

@@ -4,11 +4,12 @@ The target is `r + discount * Q(s', a')`. The ant draws a' before the update, an
 """
 
 from taichi_ants.learners.learner import td_learner
+from taichi_ants.task.rules.policy import value_at
 
 
 def td_error(value, reward, discount, next_values, next_action, epsilon):
     """Return reward + discount * Q(s', a') - Q(s, a); the discount is 0 if no a' was drawn."""
-    return reward + discount * next_values[next_action] - value
+    return reward + discount * value_at(next_values, next_action) - value
 
 
 SARSA = td_learner(

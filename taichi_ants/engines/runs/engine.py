@@ -40,6 +40,8 @@ from taichi_ants.worlds.world import World
 Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
 
 _SECONDS = 1.0
+_FEW_STEPS = 500_000  # of a run
+_TOGETHER = set[Any]()  # rules and learners of which several runs were done together
 _STEP_NS = 25  # a step of Q-learning on one thread of a slow core
 _WORKSPACE_BYTES = 256 * 2**20
 _MOST_NUMBERS = 2**30  # in one array of a launch, because kernels use 32-bit indices
@@ -204,25 +206,32 @@ class Runs:
     def __len__(self) -> int:
         return len(self.seeds)
 
-    def compiled(self, traced: bool = False) -> Callable[..., None]:
+    def compiled(self, episodes: int, traced: bool = False) -> Callable[..., None]:
         """Return a function (runs, episodes, **arrays), after compiling its kernel.
 
-        It does some episodes of some runs, both slices, and writes the results into the arrays. All
-        arrays of a launch are flat, one run after another. The sizes of a memory are multiples of
-        8, see `Learner.memory_for`.
+        It does some of these episodes of some runs, both slices, and writes the results into the
+        arrays. All arrays of a launch are flat, one run after another. The sizes of a memory are
+        multiples of 8, see `Learner.memory_for`.
         """
         # Imported here, because Taichi must be configured first; see `runtime`.
         from taichi_ants.engines.device_memory import room_for
         from taichi_ants.engines.launch import Launch
-        from taichi_ants.engines.runs.kernels import run_kernel
+        from taichi_ants.engines.runs.kernels import LANES, run_kernel
         from taichi_ants.engines.runs.step import Rules
 
         task, state = self.task, self.state
         start_cells, headings = self.world.first_starts(words_of(self.seeds))
-        changed = vars(state).keys() | TRACED
-        launch = Launch(
-            partial(run_kernel, Rules.of(task), self.learner, traced), changed, ["outcomes"]
-        )
+        settings, form = runtime.start(), (Rules.of(task), self.learner)
+        # A few runs are faster one by one, and so are those of learners with much memory. But to
+        # load another kernel takes longer than a few short runs.
+        several = not traced and 2 * len(self) >= LANES * settings.threads
+        if several:
+            _TOGETHER.add(form)
+        several |= not traced and form in _TOGETHER and episodes * self.max_steps <= _FEW_STEPS
+        several &= self.learner is None or self.learner.td_error is not None
+        lanes = LANES if several and not runtime.compiles_for_gpu() else 1
+        kernel = partial(run_kernel, *form, traced, lanes)
+        launch = Launch(kernel, vars(state).keys() | TRACED, ["outcomes"])
         falls = task.evaporation_in_training if self.learner else task.evaporation_in_evaluation
         common = {**laid_out([self.world], task, falls), "max_steps": self.max_steps}
 
@@ -234,8 +243,11 @@ class Runs:
 
         def launch_part(runs: slice, episodes: slice, **arrays: Any) -> None:
             n = runs.stop - runs.start
+            n_tasks = n if lanes == 1 else min(settings.threads, n)
             values = {
                 "n_runs": n,
+                "n_tasks": n_tasks,
+                "begun": np.full(1, n_tasks * lanes, np.int32),  # the next run that a lane takes
                 "n_episodes": episodes.stop - episodes.start,
                 "regrows": 0,  # food that grows back at once has no effect after a delivery
                 "start_cells": start_cells[runs],
@@ -251,7 +263,7 @@ class Runs:
                 "q": state.q[runs],
                 "floats": state.floats[runs],
                 "integers": state.integers[runs],
-                "cells": cells_of(n),
+                "cells": cells_of(n_tasks * lanes),
                 "keeps_tables": 0,  # 1 to write the table after each step
                 "outcomes": np.zeros((0, 0, 0), np.int32),  # (3, n, n_episodes): `OUTCOMES`
                 "trace": np.zeros((0, 0), np.int32),  # (n * n_episodes * max_steps, `TRACE`)
@@ -284,7 +296,7 @@ class Runs:
         workers, cost = settings.threads, self.cost
         if settings.arch != "cpu":
             workers, cost = _RUNS_ON_GPU, self.cost * _STEP_NS_ON_GPU / _STEP_NS
-        launch = self.compiled()
+        launch = self.compiled(episodes)
         cells = self.world.grid.size + EXTRA_CELLS
         widest = max(array[0].size for array in vars(self.state).values())
         size = size_of_launch(workers, episodes, self.max_steps, cost, cells, widest)
@@ -308,7 +320,7 @@ class Runs:
         kernel writes the table after each step of the piece into it.
         """
         runtime.start()
-        launch, max_steps = self.compiled(traced=True), self.max_steps
+        launch, max_steps = self.compiled(episodes, traced=True), self.max_steps
         keeps = {} if tables is None else {"keeps_tables": 1, "trace_tables": tables}
         # A step needs ten times as much memory as a cell of the world.
         most_runs = MAX_ROLLOUT_STEPS // max(max_steps, self.world.grid.size // 10)

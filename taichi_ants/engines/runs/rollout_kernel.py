@@ -60,7 +60,7 @@ def rollout_kernel(
     longer. `numbers` are the arguments that are in an array, see `parts_of`. Each ant draws from
     its stream in the order of a colony's.
     """
-    deposit, observe, single = rules.deposit, observe_function(rules), width == 0
+    deposit, observe, single = rules.deposit, observe_function(rules, True), width == 0
     executes = hooks_at(rules.features)["execute"]
     by_ant = has_guards(arguments) and not single
 

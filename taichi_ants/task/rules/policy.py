@@ -28,6 +28,15 @@ def best_value(values):
 
 
 @ti.func
+def value_at(values, action):
+    """Return the value of an action, by comparisons, which are faster than an index."""
+    value = values[0]
+    for a in ti.static(range(1, N_ACTIONS)):
+        value = ti.select(action == a, values[a], value)
+    return value
+
+
+@ti.func
 def lowest_bit_number(mask):
     """Return the number of the lowest set bit of a non-zero i32."""
     return popcnt((mask & -mask) - 1)

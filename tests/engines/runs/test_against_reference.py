@@ -13,7 +13,16 @@ from random_colonies import random_task
 from random_rewards import random_rewards
 from random_worlds import random_world
 
-from taichi_ants import TrainingConfig, evaluate, learners, rollout, trace_training, train
+from taichi_ants import (
+    TrainingConfig,
+    evaluate,
+    learners,
+    rollout,
+    runtime,
+    trace_training,
+    train,
+)
+from taichi_ants.engines.runs import engine
 from taichi_ants.settings import declared
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import Event
@@ -169,6 +178,43 @@ def test_whole_trainings_of_a_mixed_sweep():
                 assert result.state.epsilon[c, s] == plain.epsilon
                 if learners.get(config.learner).plans:
                     assert result.state.integers[c, s, 0] == len(plain.model)
+
+
+@pytest.mark.parametrize(
+    ("learner", "observation", "deposit", "choice", "noise"),
+    [
+        ("q_learning", "paper", "set", "greedy", NO_NOISE),
+        ("sarsa", "paper", "fading", "greedy", NOISE),
+        pytest.param("dyna_q", "paper", "none", "greedy", NO_NOISE, marks=pytest.mark.slow),
+        pytest.param("sarsa", "ants", "add", "softmax", NO_NOISE, marks=pytest.mark.slow),
+        pytest.param(
+            "expected_sarsa", "trail_levels", "set", "greedy", NOISE, marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_many_runs_equal_single_ones(learner, observation, deposit, choice, noise, monkeypatch):
+    """A task takes many runs together, and more of them than it has lanes for."""
+    monkeypatch.setattr(engine, "_FEW_STEPS", 0)  # else the single ones could use the same kernel
+    seeds = range(-3, 20 * runtime.start().threads)
+    drawn = 0
+    for number in range(4):
+        world, task = random_world(number), drawn_task(number, observation, deposit, choice, noise)
+        config = random_config(number, learner)
+        together = train(world, config, seeds, 5, 40, task)
+        tables = np.random.default_rng(number).integers(0, 4, together.q_values[0].shape)
+        epsilon = (0.0, 0.1)[number % 2]
+        rolled = evaluate(world, tables, 4, seeds, 40, task, epsilon)
+        drawn += (rolled.returns != rolled.returns[:, :1]).any(axis=1).mean()
+        for s in (0, 5, len(seeds) // 2, len(seeds) - 1):
+            alone = train(world, config, seeds[s], 5, 40, task)
+            for name in ("returns", "steps", "deliveries"):
+                assert np.array_equal(getattr(together, name)[:, s], getattr(alone, name)[:, 0])
+            for name, array in vars(alone.state).items():
+                assert np.array_equal(getattr(together.state, name)[0, s], array[0, 0]), name
+            once = evaluate(world, tables[s], 4, seeds[s], 40, task, epsilon)
+            for name in ("returns", "steps", "deliveries"):
+                assert np.array_equal(getattr(rolled, name)[s], getattr(once, name))
+    assert 0 < drawn < 4  # with ties, rollouts of a table differ
 
 
 @pytest.mark.parametrize(("observation", "deposit"), [("paper", "set"), ("five_cells", "add")])
