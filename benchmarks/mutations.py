@@ -222,7 +222,7 @@ MUTATIONS = [
     ("engines/colony/learning.py", "shape[0] - 1)]  #", "shape[0] - 2)]  #", COLONY),
     ("engines/colony/learning.py", "c.initial_q, 0.0)", "0.0, 0.0)", COLONY),
     ("engines/colony/learning.py", "if number > c.sums_of", "if number < c.sums_of", SCHEDULES),
-    ("engines/colony/learning.py", "ti.atomic_max(c.latest", "ti.atomic_min(c.latest", BY_ANT),
+    ("engines/colony/learning.py", "ti.atomic_max(c.latest[e", "ti.atomic_min(c.latest[e", BY_ANT),
     ("engines/colony/kernels.py", "if running == 1 and slot <", "if slot <", ENGINE),
     ("engines/colony/device.py", "if numbers != self._numbers:", "if not self._numbers:", BY_ANT),
     ("engines/colony/steps.py", "moves & (1 - enters)", "moves & enters", COLONY),
