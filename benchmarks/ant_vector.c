@@ -19,8 +19,6 @@ enum { LEVEL_AT = 6, CLOSER = 63, OCCUPIED = INT32_MIN };
 /* The last transition of a pair: its index in a table, the next row, reward and terminal flag. */
 enum { ROW_AT = 11, TRANSITION_AT = 22, PLACE = 2047 };
 
-#define INLINE static inline __attribute__((always_inline))
-
 typedef __m512i Ints;
 typedef __m512 Floats;
 typedef __mmask16 Mask;

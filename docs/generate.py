@@ -96,7 +96,7 @@ def listed(registry: str) -> str:
             ),
         )  # fmt: skip
     if registry == "learners":
-        return "\n\n".join(map(learner, learners.names()))
+        return all_learners()
     return table(
         ("Name", "Reads", "Unit", "Meaning"),
         (
@@ -107,22 +107,27 @@ def listed(registry: str) -> str:
     )  # fmt: skip
 
 
-def learner(name: str) -> str:
-    """Return the update of a learner, as its module describes it, and what it declares."""
-    one = learners.get(name)
-    about = import_module(f"taichi_ants.learners.{name}").__doc__ or ""
-    hyperparameters = one.hyperparameters()
-    memory = one.memory(hyperparameters, 128)
-    tables = {0: "one table", 1: "two tables"}.get(memory.tables, f"{memory.tables + 1} tables")
-    numbers = memory.floats + memory.integers
-    own = [f"`{setting.name}`" for setting in declared(one.hyperparameters)]
-    facts = (
-        ("Hyperparameters", ", ".join(own) or "none"),
-        ("Draws the next action before the update", "yes" if one.draws_next_action else "no"),
-        ("Memory for 128 states", tables + (f", and {numbers} numbers" if numbers else "")),
-        ("Ants can share a table", "yes" if one.td_error else "no"),
+def all_learners() -> str:
+    """Return what learners declare, then the update of each, as its module describes it."""
+    rows, updates = [], []
+    for name in learners.names():
+        one = learners.get(name)
+        memory = one.memory(one.hyperparameters(), 128)
+        tables = {1: "1 table"}.get(n := memory.tables + 1, f"{n} tables")
+        numbers = memory.floats + memory.integers
+        own = [f"`{setting.name}`" for setting in declared(one.hyperparameters)]
+        stored = tables + (f", {numbers} numbers" if numbers else "")
+        yes_or_no = ["yes" if is_so else "no" for is_so in (one.draws_next_action, one.td_error)]
+        rows.append([f"[`{name}`](#{name})", ", ".join(own) or "none", stored, *yes_or_no])
+        about = import_module(f"taichi_ants.learners.{name}").__doc__ or ""
+        updates.append(f"### `{name}`\n\n{about.strip()}")
+    heads = (
+        "Hyperparameters",
+        "Memory for 128 states",
+        "Draws the next action",
+        "Can share a table",
     )
-    return f"### `{name}`\n\n{about.strip()}\n\n" + table(("Property", "Value"), facts)
+    return "\n\n".join([table(("Learner", *heads), rows), *updates])
 
 
 def measures_of(kind: str) -> str:
@@ -150,14 +155,14 @@ def sweep_keys(part: str) -> str:
         rows = [[f"`[[{name}]]`", kind.__doc__.split("\n\n")[0]] for name, kind in EVENTS.items()]
     elif part in KINDS:
         own = [one for one in declared(KINDS[part]) if one.name not in KEYS]
-        rows = ([f"`{one.name}`", *one.in_words] for one in own)
-        return table(("Key", "Values", "Default", "Meaning"), rows)
+        rows = [[f"`{one.name}`", *one.in_words] for one in own]
+        return table(("Key", "Values", "Default", "Meaning"), rows).replace("'", '"')
     else:
         rows = [
             [f"`{name}`", about]
             for name, about in {"file": KEYS, "world": WORLD_KEYS}[part].items()
         ]
-    return table(("Key", "Meaning"), rows)
+    return table(("Key", "Meaning"), rows).replace("`'", '`"').replace("'`", '"`')
 
 
 def inputs(kind: str) -> str:
@@ -351,7 +356,8 @@ def public_members(kind: Any) -> dict[str, Any]:
             continue
         hidden |= {*INTERNAL.get(base.__name__, "").split()} - found.keys()
         for name, value in vars(base).items():
-            is_member = callable(value) or isinstance(value, _MEMBERS)
+            # The docstring of the class describes properties that have none of their own.
+            is_member = callable(value) or (isinstance(value, _MEMBERS) and value.__doc__)
             if is_member and name[0] != "_" and name not in hidden:
                 found.setdefault(name, value)
     return found

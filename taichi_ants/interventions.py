@@ -276,7 +276,7 @@ class Clear(Intervention, path="clear", short_for=("cells",)):
 
 @dataclass(frozen=True)
 class SetTrail(Intervention, path="trail", short_for=("level",)):
-    """Set the trail, or a further field, of cells, by default all, without rock; 0 clears it.
+    """Set the level of the trail, or of another field, on cells without rock, by default on all.
 
     >>> At(100, trail=SetTrail(25, cells=[(4, 0, 0)])).trail.level
     25

@@ -203,9 +203,8 @@ def _begun(scene: dict[str, Any], capacity: int) -> Colony:
 
 def _numbers(scene: dict[str, Any]) -> dict[str, Any]:
     """Return the settings of the task that a visitor can change."""
-    pheromone = {"level": scene["level"]}
-    if scene["rules"] & DIRECTED:
-        pheromone["slope"] = max(1, (2 * scene["level"] + 50) // 100)
+    slope = {"slope": max(1, (2 * scene["level"] + 50) // 100)}
+    pheromone = {"level": scene["level"], **(slope if scene["rules"] & DIRECTED else {})}
     return {"pheromone": pheromone, "rewards": {"shaping": scene["shaping"]}}
 
 
@@ -216,10 +215,9 @@ def _changes(event: Event, scene: dict[str, Any], colony: Colony) -> Iterator[ch
     match event.does:
         case "rock" | "food":
             yield changes.Place(event.does, cells_within(event, colony.grid))
-        case "scent":
-            yield changes.SetTrail((scene["level"] + 1) // 2, cells_within(event, colony.grid))
-        case "trail":
-            yield changes.SetTrail(scene["level"], cells_within(event, colony.grid))
+        case "scent" | "trail":
+            level = scene["level"] if event.does == "trail" else (scene["level"] + 1) // 2
+            yield changes.SetTrail(level, cells_within(event, colony.grid))
         case "erase":
             yield changes.Clear(cells_within(event, colony.grid))
             yield changes.SetTrail(0, cells_within(event, colony.grid))

@@ -55,7 +55,8 @@ class Snapshot(Record):
     Attributes:
         ground: uint8 (grid.size,), EMPTY, OBSTACLE, FOOD or QUEEN; EMPTY under ants.
         trail: int32 or float32 (grid.size,), trail levels.
-        ant_cells, ant_headings: int32 (n,), flat cell indices and headings of the living ants.
+        ant_cells: int32 (n,), flat cell indices of the living ants.
+        ant_headings: int32 (n,), their headings, 0 to 5.
         ant_carries: bool (n,), whether each ant carries food.
         ant_carried: int32 (n,), ticks since each ant picked up its food; 0 without food.
         ant_numbers: int32 (n,), the numbers of the ants.

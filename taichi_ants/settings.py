@@ -63,7 +63,8 @@ class Setting:
     Attributes:
         help: A phrase that describes the setting.
         unit: The unit of a number, for example "ticks".
-        least, most, above: Bounds: the smallest and the largest value, and an excluded lower bound.
+        least, most: The smallest and the largest value.
+        above: A lower bound that is not allowed itself.
         only: The name of another setting of the class, and the values of it that this setting
             requires; with other values it must have its default.
         usual: The value that replaces None where the setting has an effect.
@@ -214,6 +215,7 @@ class DeclaredSetting(NamedTuple):
             return self._named(value, {}) if isinstance(value, Mapping) else None
         if issubclass(self.kind, Settings):
             value = self.kind.converted(value)
+            value = self.kind.from_dict(value) if isinstance(value, Mapping) else value
         return value if isinstance(value, self.kind) else None
 
     def _named(self, value: Mapping[Any, Any], start: Mapping[str, Any]) -> Named[Any]:

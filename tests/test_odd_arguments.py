@@ -10,16 +10,19 @@ import pytest
 from taichi_ants import (
     Colony,
     Rewards,
+    Task,
     TrainingConfig,
     evaluate,
     learners,
     offline,
     record,
+    rendering,
     rollout,
     states,
     train,
 )
 from taichi_ants import worlds as places
+from taichi_ants.analysis.bounds import EpisodeBounds
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import Policy
@@ -66,6 +69,9 @@ ODD = {
     "by run": lambda _: offline.fitted_q_iteration(data(), by_run=np.zeros(0)),
     "a penalty": lambda _: offline.pessimistic_q_iteration(data(), penalty=HUGE),
     "a label": lambda _: learners.registry.label(["sarsa"]),
+    "a picture's world": lambda _: rendering.picture(SCALAR),
+    "a snapshot's world": lambda _: rendering.at_start(SCALAR),
+    "a bound's world": lambda _: EpisodeBounds(SCALAR, Task()),
     "a page's path": lambda _: check_page(None),
     "a page": lambda _: page(SCALAR),
     "numbers of worlds": lambda _: Interventions(

@@ -52,7 +52,7 @@ WRONG = {
 def wrong_values(one: DeclaredSetting) -> list:
     """Values that are not allowed."""
     if one.is_group:
-        return ["no such name", [3], {}]
+        return ["no such name", [3]]
     rule, wrong = one.rule, list(WRONG[one.kind])
     if not one.allowed_words and one.kind is str:
         wrong.remove("no such word")

@@ -133,8 +133,8 @@ export class Painter {
       const size = (0.5 + scatter(k, 3, 100) / 75) * this.dpr;
       x.fillRect(scatter(k, 1, 4096) / 4096 * width, scatter(k, 2, 4096) / 4096 * height, size, size);
     }
-    x.restore();
     this.glow(x, this.place(this.run.engine.queen), 8.5 * s, look.nestGlow);
+    x.restore();
   }
 
   /** Rocks, food and the nest: drawn again only after something has changed. */
@@ -244,7 +244,8 @@ export class Painter {
     if (s < DOTS.scale * this.dpr || e.ants > DOTS.ants) this.drawDots(x, part);
     else this.drawAnts(x, part, passed, ui);
     const size = Math.max(10.5 * this.dpr, 1.15 * s), [nx, ny] = this.place(e.queen);
-    this.label(x, "nest", nx, ny + Math.max(4.4 * s, 18 * this.dpr), size);
+    const below = Math.max(4.4 * s, 18 * this.dpr), fits = ny + below + size < this.canvas.height;
+    this.label(x, "nest", nx, fits ? ny + below : ny - below, size);
     for (const [fx, fy] of this.piles) this.label(x, "food", fx, fy - size, size);
     if (ui.ghost) this.drawGhost(x, ui);
     if (ui.pointer) this.drawBrush(x, ui);

@@ -1,21 +1,9 @@
-/* embed.js: the lab in a frame of another page, which can steer it by messages.
- *
- *   frame.contentWindow.postMessage({ lab: "start", scene: "copies" }, "*")    a question by its name, or a link's code
- *   { lab: "say", option: 0 }                       the prediction that a question waits for; it then runs
- *   { lab: "play" }, { lab: "pause" }, { lab: "speed", value: 4 }, { lab: "undo" }
- *   { lab: "set", name: "epsilon", value: 0.1 }     a setting, as in engine.js
- *   { lab: "strokes", strokes: [{ do: "rock", reach: 1, path: [[q, r], ...] }] }
- *   { lab: "skip", ticks: 500 }                     pass ticks at once
- *   { lab: "facts", every: 0 }                      answer once, or every so many ms
- *
- * Each message is answered by { lab: "facts", ... } or { lab: "error", message }; `id` is returned if it was given.
- * `?bare` in the address hides all but the world, the play button and the brushes.
- */
+/* embed.js: the lab in a frame of another page, which can steer it by messages; for these, see docs/how-to/lab.md.
+ * `?bare` in the address hides all but the world, the play button and the brushes. */
 
 import { visitOf } from "./address.js";
+import { SETTING_KINDS, STROKES } from "./link.js";
 
-const SETTINGS = ["ants", "epsilon", "rate", "discount", "level", "shaping", "learns"];
-const STROKES = ["rock", "food", "scent", "erase"];
 const MOST_TICKS = 100_000, FASTEST_MS = 50;
 
 export class Embed {
@@ -53,7 +41,7 @@ export class Embed {
       speed: () => { lab.ui.speed = number(data.value, 0.1, 64); },
       undo: () => lab.undo(),
       set: () => {
-        if (!SETTINGS.includes(data.name)) throw new Error(`set: ${data.name} is not one of ${SETTINGS.join(", ")}.`);
+        if (!SETTING_KINDS.includes(data.name)) throw new Error(`set: ${data.name} is not one of ${SETTING_KINDS.join(", ")}.`);
         lab.set(data.name, number(data.value, 0, 10_000));
       },
       strokes: () => data.strokes.forEach((stroke) => this.draw(stroke)),
@@ -69,7 +57,7 @@ export class Embed {
 
   draw({ do: brush, reach, path }) {
     const { engine } = this.lab.runs[0];
-    if (!STROKES.includes(brush) || !(reach >= 0 && reach <= 7)) throw new Error(`strokes: \`do\` is one of ${STROKES.join(", ")}, \`reach\` 0 to 7.`);
+    if (!Object.hasOwn(STROKES, brush) || !(reach >= 0 && reach <= 7)) throw new Error(`strokes: \`do\` is one of ${Object.keys(STROKES).join(", ")}, \`reach\` 0 to 7.`);
     const cells = path.map(([q, r]) => engine.at(q, r));
     if (!cells.length || !path.every(([q, r]) => engine.exists(q, r))) throw new Error("strokes: a path has cells [q, r] of the world.");
     const whole = cells.slice(1).reduce((all, cell) => all.concat(engine.line(all[all.length - 1], cell).slice(1)), [cells[0]]);

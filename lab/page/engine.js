@@ -10,10 +10,10 @@
  *   engine.pass(ticks)    events of a replay are applied on the way, each at its tick
  *   engine.apply(event)   a change between two ticks, which is recorded in `engine.events`:
  *     { do: "rock" | "food" | "scent" | "trail" | "erase", reach: 0..7, path: [cells] }
- *       scent is half as strong as a trail, which is as strong as new scent of ants
  *       a stroke: all cells within `reach` of a path of adjacent cells. While a visitor draws, apply
  *       the new cells of each frame as a separate event, without the last cell of the one before
  *       (a link then writes them as one stroke). Cells outside the world are dropped.
+ *       A trail is as strong as new scent of ants, "scent" half as strong.
  *     { do: "ants" | "epsilon" | "rate" | "discount" | "level" | "shaping" | "learns", value }
  *       `level` is how long new scent lasts, in ticks; `learns` is 0 or 1. Values are rounded to
  *       what links can have (see LIMITS); `engine.scene` has the result.
@@ -40,8 +40,7 @@
  *
  * LONE ANTS (ant.wasm)
  *   const lone = new LoneAnts(module)
- *   lone.train({ learner, rate, discount, epsilon, decay, planningSteps, truncates, seeds, episodes,
- *                maxSteps, notes }) -> { returns, steps, deliveries }, each Int32Array (seeds * episodes);
+ *   lone.train({ ... })   gives { returns, steps, deliveries }, each Int32Array (seeds * episodes)
  *   lone.values   the tables of the last call, Float32Array (seeds * 640)
  *   lone.notes    of one seed, its first steps (at most `notes`), each an object with NOTES
  *   lone.follow(tables, { seeds, rollout, maxSteps, notes })   the same for ants that only follow their tables

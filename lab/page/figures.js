@@ -16,7 +16,7 @@ export const pictureOf = (parts, width, height, label) => `<svg viewBox="0 0 ${w
  * @param {string} across what the plot shows
  */
 export function plotOf(lines, across) {
-  const bands = lines.map(([, values, halves]) => [...values].map((value, k) => [value - (halves?.[k] || 0), value + (halves?.[k] || 0)]));
+  const bands = lines.map(([, values, halves]) => Array.from(values, (value, k) => [value - (halves?.[k] || 0), value + (halves?.[k] || 0)]));
   const W = Math.min(MOST, innerWidth - 40), all = bands.flat(2), high = Math.max(...all), low = Math.min(0, ...all);
   const y = (value) => HIGH - 8 - (value - low) / (high - low || 1) * (HIGH - 22), x = (k, n) => LEFT + k / (n - 1) * (W - LEFT - 8);
   const scale = [low, (low + high) / 2, high].map((value) => `<path d="M${LEFT},${y(value)}H${W}" stroke="var(--line)"/>`
@@ -26,7 +26,7 @@ export function plotOf(lines, across) {
   const drawn = lines.map(([, values, halves], k) => {
     const edge = (side) => bands[k].map((ends, j) => point(j, values.length, ends[side]));
     return (halves ? `<path d="M${[...edge(0), ...edge(1).reverse()].join("L")}Z" fill="${colour(k)}" opacity=".22"/>` : "")
-      + `<path d="M${[...values].map((value, j) => point(j, values.length, value)).join("L")}" ${style(k)}/>`;
+      + `<path d="M${Array.from(values, (value, j) => point(j, values.length, value)).join("L")}" ${style(k)}/>`;
   });
   const legend = lines.map(([name], k) => `<span><svg width="28" height="6" aria-hidden="true"><path d="M0,3h28" ${style(k)}/></svg> ${escaped(name)}</span>`);
   return `<div class="plot"><p>${legend.join("")}</p>${pictureOf([...scale, ...drawn], W, HIGH, across)}<p>${escaped(across)}</p></div>`;

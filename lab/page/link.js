@@ -22,8 +22,8 @@ import { WORLDS } from "./worlds.js";
 /** @typedef {import("./engine.js").Change} Change */
 
 const LINK_VERSION = 1, SETTING = 4, WAIT = 6, END = 7, LONGEST_WAIT = 96;
-const STROKE_KINDS = ["rock", "food", "scent", "erase", "", "trail"]; // 4 is SETTING
-const SETTING_KINDS = ["ants", "epsilon", "rate", "discount", "level", "shaping", "learns"];
+export const STROKES = { rock: 0, food: 1, scent: 2, erase: 3, trail: 5 }; // 4 is SETTING
+export const SETTING_KINDS = ["ants", "epsilon", "rate", "discount", "level", "shaping", "learns"];
 const SCENE_NUMBERS = ["seed", "ants", "epsilon", "rate", "discount", "learns", "first", "level", "regrowth", "shaping"];
 
 /**
@@ -67,7 +67,7 @@ export function encode(scene, events) {
     }
     let cells = event.path;
     if (!goesOn) {
-      bytes.push(STROKE_KINDS.indexOf(event.do) | event.reach << 3);
+      bytes.push(STROKES[event.do] | event.reach << 3);
       put(cells[0]);
       end = cells[0];
       cells = cells.slice(1);
@@ -121,7 +121,7 @@ export function decode(code) {
   let tick = 0;
   while (at < raw.length) {
     tick += take();
-    const head = byte(), number = head >> 3, kind = STROKE_KINDS[head & 7];
+    const head = byte(), number = head >> 3, kind = Object.keys(STROKES).find((name) => STROKES[name] === (head & 7));
     if ((head & 7) === SETTING && SETTING_KINDS[number]) {
       events.push({ tick, do: SETTING_KINDS[number], value: takeSetting(SETTING_KINDS[number]) });
       continue;

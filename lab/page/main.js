@@ -212,8 +212,6 @@ class Lab {
       painter.fit(run, this.ui.theme);
       caption.style.bottom = `${painter.headroom}px`;
     }
-    const style = getComputedStyle(document.documentElement);
-    this.colours = Object.fromEntries(["text", "soft", "line", "accent"].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
     this.fits = true;
   }
 
@@ -246,7 +244,6 @@ class Lab {
   }
 
   words() {
-    if (!this.fits) this.fit();
     const { ui } = this, runs = this.runs, run = runs[runs.length - 1];
     /** @type {import("./story.js").Story} */
     const told = this.question ? questionStory(this.question, runs) : Daily.is(run) ? this.daily.story(run) : storyOf(run);
@@ -266,7 +263,7 @@ class Lab {
     byId("undo").disabled = !runs.some(hasStroke);
     byId("tick").textContent = many(run.tick);
     byId("hash").textContent = run.engine.hash();
-    this.plot.draw(runs, this.colours);
+    this.plot.draw(runs);
     if (!byId("mind").hidden && this.minds++ % 3 === 0) byId("table").innerHTML = mindOf(run, ui);
   }
 

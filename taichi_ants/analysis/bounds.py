@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.features.support import PLAIN, refuse_unsupported
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Rewards, Task
@@ -73,6 +73,8 @@ class EpisodeBounds:
     """
 
     def __init__(self, world: World, task: Task) -> None:
+        expect("world", world, World)
+        expect("task", task, Task)
         refuse_unsupported("an exact bound", world.uses() | task.uses(), SUPPORTS)
         if task.evaporation_in_training and task.pheromone.evaporation != "none":
             raise AntsError(

@@ -85,7 +85,7 @@ class Labour(Settings, path="task.labour"):
 
 @dataclass(frozen=True)
 class Threshold(Settings, path="task.castes.NAME.threshold"):
-    """The distribution of the response thresholds of a caste, by default none; see the module.
+    """The distribution of the response thresholds of a caste, by default none.
 
     >>> task.Caste(threshold=5).threshold.distribution
     'fixed'

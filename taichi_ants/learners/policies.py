@@ -74,6 +74,7 @@ def action_probabilities(
     >>> action_probabilities(np.array([0, 1, 1, 0, 0]), epsilon=0.5).tolist()
     [0.1, 0.35, 0.35, 0.1, 0.1]
     """
+    q_values = np.asarray(q_values)
     explores = np.floor(epsilon * 2.0**32) / 2.0**32
     if choice is not None and (weights := choice.weights(q_values)) is not None:
         shares = weights / weights.sum(axis=-1, keepdims=True)

@@ -1,7 +1,7 @@
 """Measures: registered functions of the state of a colony or of finished runs, and their series.
 
 `Colony.run(..., measures=("deliveries", "entropy"), every=100)` reads measures. `register` adds
-your own. docs/how-to/measures.md lists the built-in ones.
+your own. docs/reference/measures.md lists the built-in ones.
 """
 
 from taichi_ants.measures.built_in import BUILT_IN, shortest_path

@@ -19,8 +19,9 @@ class Series(Record):
     """The values of measures in R rows, each for one world at one tick of an episode.
 
     Attributes:
-        worlds, episodes, ticks: int32 (R,), the number of the world, of the episode of `run`, and
-            of ticks since the episode began.
+        worlds: int32 (R,), the number of the world.
+        episodes: int32 (R,), the number of the episode of `run`.
+        ticks: int32 (R,), the ticks since the episode began.
         values: The values of each measure by name, float64 (R,). Measures with parts have a name
             for each, as "entropy.trail". A value is nan if the measure has none.
         units: The unit of each measure by name; "" if it has none.

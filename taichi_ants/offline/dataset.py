@@ -38,7 +38,8 @@ class Dataset(Record):
     The *behaviour policy* is the policy that chose the actions. The arrays (n,) are read-only.
 
     Attributes:
-        world, task: The world at the start, and the rules.
+        world: The world at the start.
+        task: The rules.
         seeds: One seed per run.
         behaviour: Facts about the behaviour policy, JSON-compatible.
         run: int32, the number of the seed, ascending.
@@ -46,7 +47,9 @@ class Dataset(Record):
             began, and their steps are in order.
         agent: int32, the number of the ant in its colony; 0 for a lone ant.
         step: int32, the tick in the world's episode, from 0; ants that are born start later.
-        state, action, reward, next_state: int32; actions are 0 to 4.
+        state, next_state: int32, the state index before and after the step.
+        action: int32, 0 to 4.
+        reward: int32.
         terminated: bool, whether the episode ends here in a terminal state.
         truncated: bool, whether the episode ends here without a terminal state.
         behaviour_probability: float64, the probability with which the behaviour policy took the

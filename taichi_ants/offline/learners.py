@@ -123,7 +123,8 @@ class EmpiricalModel:
         largest: The largest absolute reward of the task.
         groups: int32 (groups + 1,), the index of the first pair of each group, then of the end.
         pairs: int32 (pairs,), state * 5 + action, ascending in a group.
-        counts, rewards: int64, float64 (pairs,), numbers of transitions and their mean rewards.
+        counts: int64 (pairs,), numbers of transitions.
+        rewards: float64 (pairs,), their mean rewards.
         begins: int32 (pairs + 1,), the index of the first successor of each pair, then of the end.
         successors: int32 (k,), states, ascending in a pair; none for transitions that terminated.
         probabilities: float64 (k,); for a pair that may terminate, their sum is less than 1.

@@ -35,6 +35,7 @@ def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
     >>> rendering.at_start(worlds.paper(), n=3).ant_cells.shape
     (3,)
     """
+    expect("world", world, World)
     cells, headings = world.start(seed, n) if n else np.zeros((2, 0), np.int32)
     return Snapshot(
         *(world.grid, world.ground(), world.trail_levels(), cells, headings),
@@ -51,6 +52,7 @@ def picture(world: World, size: tuple[int, int] = DEFAULT_SIZE) -> np.ndarray:
     >>> rendering.picture(worlds.paper(), size=(320, 240)).dtype
     dtype('uint8')
     """
+    expect("world", world, World)
     return Scene(world.grid, size).draw(at_start(world, n=len(world.ants)))
 
 

@@ -38,7 +38,10 @@ KEYS = {
     "vary": "the settings that vary: in a table `[vary]`, or in several `[[vary]]`, each with its "
     "own combinations",
     "against": "the baseline: a setting of `[vary]` with one of its values",
-    **{key.name: f"{key.rule.help} (default: {key.in_words[1]})" for key in declared(Design)},
+    **{
+        key.name: f"{key.rule.help}; {key.in_words[0]} (default: {key.in_words[1]})"
+        for key in declared(Design)
+    },
 }
 # Settings of points whose values are read in another form.
 WORLD_KEYS = {

@@ -37,8 +37,9 @@ class World:
         ranges: (X, Y, Z), the number of values of each coordinate, in cells, each at least 1.
         queen: (x, y, z), the cell of the queen of the first nest. Give one cell, or a sequence of
             cells for several nests, at most 7.
-        foods, obstacles: Cells with food or obstacles, int32 (n, 3). Give a sequence of (x, y, z),
-            or such an array. A food item can also be ((x, y, z), kind).
+        foods: Cells with food, int32 (n, 3). Give a sequence of (x, y, z), or such an array. A food
+            item can also be ((x, y, z), kind).
+        obstacles: Cells with rocks, likewise.
         trails: Cells with trails, int32 (T, 4) = x, y, z, level (ticks until the trail has
             evaporated). Give a sequence of ((x, y, z), level), or such an array. Level 0 means no
             trail. If `Pheromone.dense`, levels are float32, so those above 2**24 are rounded.

@@ -121,7 +121,8 @@ def test_mistakes_are_one_sentence(tmp_path, policy, name, run) -> None:
 def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, kernels) -> None:
     # An ant that moves at random has far more steps to take than there is time for.
     arguments = ["episode", "--policy", str(policy), "--epsilon", "1", "--max-steps", "100000"]
-    arguments += ["--world", "open", "--size", "1600x1200", "--out", f"{tmp_path}/new/a.gif"]
+    arguments += ["--world", "open", "--size", "1600x1200"]
+    arguments += ["--out", str(tmp_path / "new" / "a.gif")]
     with start("render", arguments, kernels, tmp_path) as running:
         time.sleep(2.5)  # it draws, into memory
         running.send_signal(signal.SIGINT)

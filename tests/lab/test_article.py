@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from browser import started
+from browser import Page, started
 
 from taichi_ants import runtime
 
@@ -16,14 +16,11 @@ ORDER |= {"bridge": (3, 0), "chance": (0, 2), "forget": (3, 1), "wall": (3, 2, 1
 ORDER |= {"learning": (1, 0), "pay": (3, 0)}
 
 
-class Article:
+class Article(Page):
+    ready = "window.article"
+
     def __init__(self, browser, width=1024, height=768, **options):
-        size = {"width": width, "height": height}
-        self.tab = browser.new_context(viewport=size, offline=True, **options).new_page()
-        self.faults = []
-        self.tab.on("pageerror", lambda error: self.faults.append(str(error)))
-        self.tab.on("console", lambda message: self.faults.append(message.text))
-        self.tab.goto(FILE.as_uri())
+        super().__init__(browser, FILE, (width, height), **options)
 
     def read(self, name, script):
         find = f"const world = article.worlds.find(({{ id }}) => id === '{name}')"
@@ -44,7 +41,7 @@ def opened():
     with started() as browser:
         pages = []
         yield lambda *size, **options: pages.append(Article(browser, *size, **options)) or pages[-1]
-        assert [page.faults for page in pages] == [[]]
+        pages[0].close()
 
 
 @pytest.mark.browser

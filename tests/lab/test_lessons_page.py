@@ -7,9 +7,10 @@ import re
 from pathlib import Path
 
 import pytest
-from browser import started
+from browser import Page, started
 
 DOCS = Path(__file__).parents[2] / "docs"
+FILE = DOCS / "lessons.html"
 # Experiments whose numbers are those of the notebook, cell by cell.
 SAME = ("markov", "sweep", "values", "update", "wrong", "planning", "opens", "two", "practice")
 FUNCTION = "function qLearning(q, s, a, r, sNext, terminated, alpha, gamma) { %s }"
@@ -22,21 +23,21 @@ def browser():
         yield one
 
 
+class Lessons(Page):
+    ready = "window.lessons"
+
+
 @pytest.fixture
 def opened(browser):
-    faults = []
+    pages = []
 
     def open_page(address, width=1024):
-        size = {"width": width, "height": 768}
-        tab = browser.new_context(viewport=size, offline=True).new_page()
-        tab.on("pageerror", lambda error: faults.append(str(error)))
-        tab.on("console", lambda message: faults.append(message.text))
-        tab.goto((DOCS / "lessons.html").as_uri() + address)
-        tab.wait_for_function("window.lessons")
-        return tab
+        pages.append(Lessons(browser, FILE.as_uri() + address, (width, 768)))
+        return pages[-1].tab
 
     yield open_page
-    assert faults == []
+    for page in pages:
+        page.close()
 
 
 def numbers(text):

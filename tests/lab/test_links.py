@@ -19,7 +19,6 @@ from taichi_ants.worlds.lab import WORLDS, lab_world
 CODE = "AQAPVUAeZIQHAQrYBAEC"  # of the first screen
 AT_ONCE = [{"tick": 5, "do": "rock", "reach": 1, "path": [cell]} for cell in (2112, 2113)]
 THOUSANDTHS = ("epsilon", "rate", "discount")
-STROKES = list(filter(None, lab.STROKES))
 
 
 def of_setting(name):
@@ -58,7 +57,10 @@ def visits(draw):
                     q, r = ahead
                     path.append(ahead)
         if path:
-            does, reach = draw(st.sampled_from(STROKES)), draw(st.integers(0, 7))
+            does, reach = (
+                draw(st.sampled_from([*filter(None, lab.STROKES)])),
+                draw(st.integers(0, 7)),
+            )
             if events and "path" in events[-1]:
                 does, reach = events[-1]["do"], events[-1]["reach"]
             width, end = 2 * radius + 1, (q, r)

@@ -10,7 +10,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from browser import started
+from browser import Page, started
 
 from taichi_ants import lab, runtime
 
@@ -73,23 +73,13 @@ def browser():
         yield one
 
 
-class Lab:
-    """The page, without a network; the errors on it; time that tests pass by ticks."""
+class Lab(Page):
+    """The page of the lab; time that tests pass by ticks."""
+
+    ready = "window.lab && lab.firstFrame"
 
     def __init__(self, browser, address="", size="desk", **options):
-        width, height = SIZES[size]
-        self.context = browser.new_context(
-            viewport={"width": width, "height": height}, offline=True, **options
-        )
-        self.tab = self.context.new_page()
-        self.faults = []
-        self.tab.on("pageerror", lambda error: self.faults.append(str(error)))
-        self.tab.on("console", lambda message: self.faults.append(message.text))
-        self.tab.goto(FILE.as_uri() + address)
-        self.tab.wait_for_function("window.lab && lab.firstFrame")
-
-    def read(self, script, argument=None):
-        return self.tab.evaluate(script, argument)
+        super().__init__(browser, FILE.as_uri() + address, SIZES[size], **options)
 
     def visit(self, name):
         """Write a name or a link into the address."""
@@ -129,10 +119,6 @@ class Lab:
         self.read("lab.play(false)")
         self.tab.click("#copy")
         return self.read("location.hash.slice(1)")
-
-    def close(self):
-        self.context.close()
-        assert self.faults == []
 
 
 @pytest.fixture

@@ -56,6 +56,8 @@ def shares(sheets: list[np.ndarray], *colours: str) -> list[float]:
 class Page:
     """A page opened from a file or a server, with the errors on it."""
 
+    ready = "window.viewer"  # holds when its scripts have run
+
     def __init__(
         self, browser: Any, path: Path | str, size: tuple[int, int] = (1280, 720), **options: Any
     ):
@@ -69,12 +71,12 @@ class Page:
         self.tab.on("console", lambda message: self.faults.append(message.text))
         self.tab.on("pageerror", lambda error: self.faults.append(str(error)))
         self.tab.goto(url)
-        self.tab.wait_for_function("window.viewer")
+        self.tab.wait_for_function(self.ready)
         self.settle()
 
     def settle(self) -> None:
-        """Wait until the page has drawn everything."""
-        self.tab.wait_for_function("!viewer.dirty && !viewer.player.playing")
+        """Wait until the viewer has drawn everything."""
+        self.tab.wait_for_function("!window.viewer || !viewer.dirty && !viewer.player.playing")
 
     def read(self, script: str, argument: Any = None) -> Any:
         """Return the result of a script."""

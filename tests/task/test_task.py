@@ -94,6 +94,7 @@ def test_cues_are_fields_of_the_task():
     task = Task(fields=HOME, homing_cue="home")
     assert task == Task().replace(fields=HOME, homing_cue="home") == Task.from_dict(task.as_dict())
     assert task.fields["home"] == Field(deposited_when="without_food")
+    assert Task(life={"regrowth": 3}) == Task().replace(life={"regrowth": 3})
 
 
 def castes(**settings):

@@ -25,9 +25,9 @@ class Colony(TickingColony):
     """Colonies of ants, one in each of W worlds, that act and learn tick by tick.
 
     A colony depends only on its world, configuration and seed, not on the other worlds, the number
-    of threads or the schedule. Its properties are arrays with an entry for each world, some of them
-    views that you may change. Those (W, capacity) have an entry for each slot, which is a place for
-    an ant, and show the last ant in the slot. Those of features that the task lacks are 0.
+    of threads or the schedule. Most of its properties are arrays with an entry for each world, some
+    of them views that you may change. Those (W, capacity) have an entry for each slot, which is a
+    place for an ant, and show the last ant in it. Those of features that the task lacks are 0.
 
     Args:
         world: One world for all seeds, or one per seed, all with the same ranges.

@@ -22,9 +22,11 @@ class ColonyEpisodes(Record, Tidy):
         ticks: int32, the length of the episode.
         deliveries: int32, the number of deliveries.
         first_delivery: int32, ticks to the first delivery; -1 if there was none.
-        moves, blocked: int64, the number of attempts to move, and of those that failed.
+        moves: int64, the number of attempts to move.
+        blocked: int64, the number of those that failed.
         carried: int64, the ticks with food of all delivered loads.
-        births, deaths: int32, the number of ants that were born, and that died.
+        births: int32, the number of ants that were born.
+        deaths: int32, the number of ants that died.
         waiting_births: int32, the food that is not an ant yet at the end, because no cell next to
             its queen is free or `capacity` ants live.
         regrown: int32, the number of food items that grew back.

@@ -347,7 +347,7 @@ class Interventions:
     """Changes of some worlds of a colony, and of the start of their later episodes.
 
     Args:
-        colony: A `Colony`, which imports this module.
+        colony: The `Colony` to change.
         worlds: Numbers of the worlds to change, None for all. Worlds of a colony share the numbers
             of the task, epsilon, the learning rate and the number of ants at the start, so these
             can only change in all worlds that are still running.

@@ -188,11 +188,13 @@ class Trace(Record):
         steps: Number of the step in its episode, from 0.
         cells: int32 (n, 3), cube coordinates in normal form.
         headings: Heading of the ant, 0 to 5.
-        paper_states, states: The paper's state, see `taichi_ants.task.states`; state index, which
-            is the same with the paper's observation.
-        actions, rewards, events: Action, 0 to 4; its reward; its result, see `Event`.
+        paper_states: The paper's state, see `taichi_ants.task.states`.
+        states: The state index; with the paper's observation, that of the paper's state.
+        actions: Action, 0 to 4.
+        rewards: Its reward.
+        events: Its result, an `Event`.
         executed: Action as executed, which differs from the chosen one only if actions slip.
-        next_paper_states, next_states: The paper's state and state index after the step.
+        next_paper_states, next_states: As above, after the step.
         terminated: bool (n,), whether the learner treated the next state as terminal.
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), the TD error of the step; None without learning.
