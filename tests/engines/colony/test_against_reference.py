@@ -80,7 +80,7 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK, LONG = (0, 1, 10, 13), (2, 3, 4, 5, 6, 7, 8, 9, 14)
+QUICK, LONG = (0, 1, 10, 13), (2, 3, 4, 5, 6, 7, 8, 9, 11, 14)
 
 
 def marked(kernels: list, quick: tuple[int, ...], long: tuple[int, ...]) -> list:
