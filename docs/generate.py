@@ -321,7 +321,6 @@ INTERNAL = {
     "SetTask": "as_dict changed check check_in converted",
     "SetTrail": "check_in",
     "Setting": "replace",
-    "TickingColony": "reset_worlds",
     "ColonyState": "nbytes next_actions streams tables_of_ants",
     "Recording": "to_bytes",
     "Dataset": "described facts",

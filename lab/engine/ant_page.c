@@ -1,7 +1,7 @@
 /* Lone ants for a page: training runs of ant.c, in the world of the paper. */
 #include <stdint.h>
 
-/* A step of the first run, in the order of STEP in engine.js: the cell and heading after it, and
+/* A step of the first run, in the order of NOTES in engine.js: the cell and heading after it, and
  * the value of the pair of observation and action after the ant has learned from it. */
 typedef struct {
     int32_t episode, step, state, action, reward, next, terminated, cell, heading;

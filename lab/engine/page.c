@@ -334,7 +334,7 @@ EXPORT void set_ants(int n)
 
 /* ---- What the page reads ------------------------------------------------------------------- */
 
-/* The places of arrays, in the order of ARRAYS in engine.js. */
+/* The places of arrays, as `look` in engine.js numbers them. */
 EXPORT void *array(int k)
 {
     void *all[] = {C.ground, page.ground, page.levels, page.traffic, page.brush,

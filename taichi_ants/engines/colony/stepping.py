@@ -135,7 +135,7 @@ class TickingColony(ColonyState):
         self.ready[which] = True
 
     def reset_worlds(self, which: np.ndarray, seeds: Sequence[int] | None = None) -> None:
-        """Start the next episode of some worlds, bool (W,), while the others continue.
+        """Start the next episode of the worlds `which`, bool (W,), while the others continue.
 
         For these worlds it does the same as `end_episode` and `begin_episode`, but does not change
         epsilon and the learning rate. With `seeds`, one for each of these worlds, they restart as
@@ -144,6 +144,10 @@ class TickingColony(ColonyState):
 
         Raises:
             AntsError: The number of worlds or seeds is wrong, or a seed is not allowed.
+
+        >>> colony.reset_worlds(np.array([True]))
+        >>> colony.episode, colony.ticks
+        (1, 0)
         """
         which = as_array("which", which, "b", (len(self.seeds),))
         if seeds is None:
