@@ -254,7 +254,6 @@ def test_all_kernels_have_guards_on_a_gpu():
         if unguarded:
             plain[path.relative_to(PACKAGE).as_posix()] = unguarded
     assert plain == {
-        "engines/colony/memory.py": 2,  # copies
         "engines/learner_check.py": 2,  # `testing` checks rules and learners on the CPU
         "engines/own_rules.py": 1,
         "rendering/raster_kernels.py": 2,  # colours, rounded to whole numbers

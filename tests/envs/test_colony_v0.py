@@ -39,7 +39,12 @@ def guided(infos: dict, rng: np.random.Generator) -> dict[str, int]:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "paper")) for name in TASKS]
+    "name",
+    [
+        "paper",
+        pytest.param("births", marks=pytest.mark.slow),
+        *(pytest.param(name, marks=pytest.mark.long) for name in ("foraging", "queueing")),
+    ],
 )
 def test_pettingzoo_finds_no_fault(name):
     """With births it can only note that not all agents that were possible have lived."""

@@ -178,7 +178,7 @@ def test_deliveries_of_ants_that_misread_by_hand(script, ticks, delivered, expec
     assert summary[0] == {"misread": 0, "with trails": 5, "without": 3, "difference": 2}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_rate_of_no_misread_cells_does_not_matter_and_a_rate_of_all_does(script):
     found = script("models/misreading", EPISODES=6, TICKS=300)
 

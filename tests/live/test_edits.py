@@ -30,10 +30,7 @@ KERNELS = [
     ("n_step_sarsa", "independent", "paper", False, "blocking", "half"),
 ]
 TRAINING = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 0.9)
-MARKED = [
-    pytest.param(one, marks=[[], pytest.mark.slow, pytest.mark.long][min(k, 2)])
-    for k, one in enumerate(KERNELS)
-]
+MARKED = [pytest.param(one, marks=[pytest.mark.long] * (k > 0)) for k, one in enumerate(KERNELS)]
 
 
 def assert_sound(interventions: Interventions) -> None:

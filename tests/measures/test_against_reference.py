@@ -41,7 +41,7 @@ def expected(plain: ReferenceColony) -> list[dict]:
     ("schedule", "threads", "changes"),
     [
         ("by_chunk", 2, True),
-        pytest.param("by_world", 1, False, marks=pytest.mark.slow),
+        pytest.param("by_world", 1, False, marks=pytest.mark.long),
         pytest.param("by_chunk", 2, False, marks=pytest.mark.long),
         pytest.param("by_world", 2, True, marks=pytest.mark.long),
     ],
@@ -90,7 +90,7 @@ def test_births_that_wait_equal_the_reference():
     assert living[-1] == 12
 
 
-@pytest.mark.parametrize("schedule", ["by_chunk", pytest.param("by_world", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("schedule", ["by_chunk", pytest.param("by_world", marks=pytest.mark.long)])
 def test_reading_changes_nothing(schedule):
     for seed in range(3):
         drawn = random_colony(seed, learner="q_learning", dense=False, changes=True)

@@ -80,7 +80,7 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK, LONG = (0, 1, 10, 13), (2, 3, 4, 5, 6, 7, 8, 9, 14)
+QUICK, LONG = (0, 1, 10, 13), (2, 3, 4, 5, 6, 7, 8, 9, 11, 14)
 
 
 def marked(kernels: list, quick: tuple[int, ...], long: tuple[int, ...]) -> list:
@@ -97,7 +97,7 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
     seen = np.zeros(5, dtype=int)
     later = KERNELS.index(kernel) not in QUICK
     is_large = observations.get(observation).n_states >= 1000
-    for seed in range(8 if is_large or later else 10):
+    for seed in range(8 if is_large or later else 12):
         rewards, changes = random_rewards(seed), kernel is not KERNELS[0]
         drawn = of_kernel(seed, *parts, rewards=rewards, changes=changes, **rules)
         if drawn.sharing == "independent":  # newborn ants begin with these values
@@ -174,7 +174,7 @@ def test_every_tick_with_castes_and_division_of_labour(kernel):
     *parts, castes, labour, nests, more = kernel
     seen, cues = np.zeros(6, dtype=int), more.get("cues_of")
     rules = {name: one for name, one in more.items() if name != "cues_of"}
-    for seed in range(13):
+    for seed in range(18):
         drawn = of_kernel(seed, *parts, **rules)
         if nests > 1:
             drawn = with_nests(drawn, seed, nests, 1, loads=False)

@@ -17,7 +17,7 @@ from taichi_ants.engines.colony import state
 from taichi_ants.engines.colony.layout import BY_ANT, schedule_of
 
 QUICK = "nests", "castes_fields"
-LATER = "labour_fields", "own_deposit", "n_step"  # the others take a minute
+LATER = "labour_fields", "n_step"  # the others take a minute
 MARKED = [
     pytest.param(one, marks=[] if one in QUICK else getattr(pytest.mark, later))
     for one in drawing.GROUPS

@@ -45,7 +45,7 @@ MARKED = [pytest.param(*one, marks=[pytest.mark.slow] * (one in LATER)) for one 
 # The same with a rule of choice and noise.
 NOISY = [
     ("sarsa", "ants", "set", "softmax", NOISE),
-    pytest.param("q_learning", "paper", "fading", "softmax", NO_NOISE, marks=pytest.mark.slow),
+    pytest.param("q_learning", "paper", "fading", "softmax", NO_NOISE, marks=pytest.mark.long),
     pytest.param("expected_sarsa", "paper", "add", "greedy", NOISE, marks=pytest.mark.slow),
     pytest.param("sarsa_lambda", "trail_levels", "set", "greedy", "slip", marks=pytest.mark.long),
     pytest.param(
