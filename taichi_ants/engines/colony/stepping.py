@@ -24,8 +24,8 @@ _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _SORT_SECONDS = 0.25  # about the time in which Taichi loads the kernel that sorts
 _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # checks of a thread at a barrier, which take at least half a second
-# Trials of another number of threads: seconds in a launch, so that waking threads takes little of
-# them; the share of all time; and the log of the gain in speed for which the number changes.
+# Trials of another number of threads: seconds in a launch, the share of all time, and the log of
+# the gain in speed for which the number changes.
 _TRIAL_SECONDS, _TRIAL_SHARE, _LEAST_GAIN = 0.01, 0.03, 0.02
 
 
@@ -34,8 +34,9 @@ class ThreadChoice:
 
     Threads that share a tick wait for each other several times, and they wait long if other
     programs use the processors. So the choice starts with all threads, and tries the next lower and
-    the next higher number in turn. A trial is one short launch with the other number and one with
-    the present number. The launches with the other number take at most `_TRIAL_SHARE` of all time.
+    the next higher number in turn. A trial is two short launches with the other number and two with
+    the present number. The first of each does not count, because threads that have rested wake up
+    late. The launches with the other number take at most `_TRIAL_SHARE` of all time.
     """
 
     def __init__(self, most: int = 1) -> None:
@@ -47,7 +48,7 @@ class ThreadChoice:
         self._step = 1  # to the neighbour that was tried last, then the other one
         self._pending: list[int] = []  # the places of a trial's launches that are left
         self._ticks = 1  # in each of them
-        self._tried = 1.0  # seconds per tick in the first of them
+        self._tried = 1.0  # seconds per tick with the other number
 
     def plan(self, ticks: int, most: int) -> tuple[int, int]:
         """Return the number of ticks for the next launch, and of threads, up to `most`."""
@@ -58,8 +59,8 @@ class ThreadChoice:
             step = -self._step if 0 <= self.at - self._step < len(self.numbers) else self._step
             other, self._ticks = self.at + step, max(1, min(ticks, round(_TRIAL_SECONDS / pace)))
             expected = self.seconds_per_tick.get(self.numbers[other], 2 * pace)
-            if self._ticks * expected <= self.allowance:
-                self._pending, self._step = [other, self.at], step
+            if 2 * self._ticks * expected <= self.allowance:
+                self._pending, self._step = [other, other, self.at, self.at], step
         if self._pending:
             return min(ticks, self._ticks), self.numbers[self._pending[0]]
         return ticks, self.numbers[self.at]
@@ -68,10 +69,10 @@ class ThreadChoice:
         """Take notice of the time of a launch that followed the last plan."""
         self.seconds_per_tick[threads] = seconds / ticks
         self.allowance += _TRIAL_SHARE * seconds
-        if len(self._pending) == 2:
+        if len(self._pending) > 2:
             self.allowance -= seconds
             self._tried = seconds / ticks
-        elif self._pending:
+        elif len(self._pending) == 1:
             other = self.at + self._step
             gain = math.log(seconds / ticks / self._tried)
             self.gains[other] = gain + self.gains.get(other, 0.0) / 2
