@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import gpu
 import pytest
@@ -11,7 +13,11 @@ from taichi_ants import runtime
 
 
 @pytest.fixture(autouse=True)
-def on_cpu_afterwards(monkeypatch):
+def in_this_process(monkeypatch):
+    def pool(workers, context, *start):
+        return ThreadPoolExecutor(1, "", *start)
+
+    monkeypatch.setattr(gpu, "ProcessPoolExecutor", pool)
     monkeypatch.setattr(runtime, "gpu_kernels_on_cpu", False)
 
 
@@ -39,7 +45,8 @@ def test_results_that_differ_are_an_error(monkeypatch, capsys):
     assert printed.err == "error: some parts failed, or differ from those of a CPU.\n"
 
 
-def test_parts_are_left_out_after_some_time(capsys):
+def test_parts_are_left_out_after_some_time(monkeypatch, capsys):
+    monkeypatch.setattr(gpu, "compared", lambda case, expected: time.sleep(0.1))
     run("--on-cpu", "--only", "colony", "--seconds", "0")
     assert capsys.readouterr().out.count("  left out\n") == len(gpu.record.drawing.GROUPS)
 

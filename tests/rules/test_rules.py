@@ -231,7 +231,7 @@ REFUSED = [
     (lambda: Task(rules={"nothing": {}}), "there is no rule 'nothing'"),
     (lambda: Task(choice="weber", rules={"weber": {"k": 31}}), "`task.rules.weber.k` is 31"),
     (lambda: Task(choice="weber", rules={"weber": {"q": 1}}), "`task.rules.weber.q` is not"),
-    (lambda: Task("ants", choice="weber", noise={"misread": 0.1}), "`task.noise` is"),
+    (lambda: Task("ants", choice="weber", noise={"misread": 0.1}), "`task.observation` is"),
     (
         lambda: train(worlds.paper(), own_config(), 0, 1, task=Task(reward="shaped")),
         "`task.reward` is 'shaped', which a run of one ant does not support",

@@ -125,28 +125,23 @@ class ColonyState:
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
     """
 
-    if TYPE_CHECKING:  # the views of arrays, see below
+    if TYPE_CHECKING:  # the views of arrays, see below; features declare others
+
+        def __getattr__(self, name: str) -> np.ndarray: ...
+
         _stages: np.ndarray
         actions: np.ndarray
-        ages: np.ndarray
         carried: np.ndarray
         carrying: np.ndarray
-        caste_deliveries: np.ndarray
-        castes: np.ndarray
         cells: np.ndarray
         events: np.ndarray
         executed: np.ndarray
-        food_kinds: np.ndarray
         headings: np.ndarray
-        idle: np.ndarray
-        kinds: np.ndarray
         nests: np.ndarray
         next_actions: np.ndarray
         numbers: np.ndarray
         paper_states: np.ndarray
         states: np.ndarray
-        stimuli: np.ndarray
-        thresholds: np.ndarray
 
     def __init__(
         self,
