@@ -216,7 +216,7 @@ assert colony.schedule == "by_ant"
 """
 
 
-@pytest.mark.slow  # it compiles ten kernels
+@pytest.mark.slow  # it compiles twenty kernels
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 def test_compiled_for_a_gpu_no_product_is_fused_and_no_quotient_approximated(tmp_path):
     driver = Path(__file__).parents[1] / "support" / "fake_cuda.c"
@@ -226,7 +226,7 @@ def test_compiled_for_a_gpu_no_product_is_fused_and_no_quotient_approximated(tmp
     run_script(FOR_CUDA, tmp_path, **folders)
     assert {"div.approx", "fma.rn"} <= changed_arithmetic(tmp_path / "1.ptx")
     files = [*(tmp_path / "guarded").glob("*.ptx")]
-    assert len(files) > 22
+    assert len(files) > 20
     for path in files:
         assert not changed_arithmetic(path), path
 
