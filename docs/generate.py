@@ -355,7 +355,7 @@ def public_members(kind: Any) -> dict[str, Any]:
             continue
         hidden |= {*INTERNAL.get(base.__name__, "").split()} - found.keys()
         for name, value in vars(base).items():
-            # The docstring of the class describes properties that have none of their own.
+            # The docstring of the class describes properties that have no docstring.
             is_member = callable(value) or (isinstance(value, _MEMBERS) and value.__doc__)
             if is_member and name[0] != "_" and name not in hidden:
                 found.setdefault(name, value)

@@ -1,7 +1,7 @@
 """Copies between NumPy arrays and the memory of a device, such as a GPU.
 
-Taichi itself copies a NumPy array into fresh memory and back at each launch, in both directions, at
-about 1 GB/s on a GPU that can do 10.
+Taichi itself would copy each NumPy array into fresh memory and back at every launch, whether or not
+the kernel reads or changes it.
 """
 
 from __future__ import annotations

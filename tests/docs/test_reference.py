@@ -24,7 +24,7 @@ from taichi_ants.task.observations.observation import OBSERVATIONS
 from taichi_ants.worlds.registry import WORLDS
 
 _PAGE = (ROOT / "docs" / "reference" / "api.md").read_text("utf-8")
-# What the examples begin with; each begins with a new colony.
+# The setup of all examples, and the colony that is made anew for each.
 SETUP, COLONY = re.findall(r"```python\n(from dataclasses.*?)(colony = .*?)```", _PAGE, re.S)[0]
 SLOW = {"check_observation", "check_rule", "replay"}
 # Records, codes and functions of kernels, and the public object in whose example they occur.
