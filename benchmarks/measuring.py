@@ -33,18 +33,9 @@ def machine(packages: Sequence[str]) -> str:
     """Return a description of the machine: processors, system, and versions of packages."""
     versions = [f"{name} {version(name)}" for name in packages if find_spec(name) is not None]
     return (
-        f"{_processor()}, {runtime.available_threads()} processors, {platform.system()}, "
+        f"{runtime.processor()}, {runtime.available_threads()} processors, {platform.system()}, "
         f"Python {platform.python_version()}, {', '.join(versions)}."
     )
-
-
-def _processor() -> str:
-    described = Path("/proc/cpuinfo")
-    if described.exists():
-        for line in described.read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
 
 
 def pace(work: Work, seconds: float) -> tuple[float, float]:

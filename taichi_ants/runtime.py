@@ -64,6 +64,16 @@ def available_threads() -> int:
     return n
 
 
+@cache
+def processor() -> str:
+    """Return the name of the processor, or of its architecture if the name is unknown."""
+    with contextlib.suppress(OSError, StopIteration):
+        lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
+        line = next(line for line in lines if line.startswith("model name"))
+        return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
 def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     """Return the settings of Taichi, after it was started, or restarted for other settings.
 

@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import __version__, files
+from taichi_ants import __version__, files, runtime
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.settings import flat
 from taichi_ants.studies.store import BLOCKS, Arrays, Store
@@ -215,7 +215,7 @@ def provenance(arguments: Sequence[str]) -> dict[str, Any]:
         "python": platform.python_version(),
         "packages": packages(),
         "platform": platform.platform(),
-        "processor": processor(),
+        "processor": runtime.processor(),
         "cpus": os.cpu_count(),
     }
 
@@ -251,12 +251,3 @@ def packages(also: Iterable[str] = ()) -> dict[str, str]:
                 waiting += [re.sub(r"[-_.]+", "-", name).lower() for name in names]
     versions.pop("taichi-ants", None)
     return {"taichi_ants": __version__, **dict(sorted(versions.items()))}
-
-
-def processor() -> str:
-    """Return the name of the processor, or of its architecture if the name is unknown."""
-    with suppress(OSError, StopIteration):
-        lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
-        line = next(line for line in lines if line.startswith("model name"))
-        return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()

@@ -42,6 +42,8 @@ Progress = Callable[[float], None]  # called with the share of the work that is 
 _SECONDS = 1.0
 _FEW_STEPS = 500_000  # of a run
 _TOGETHER = set[Any]()  # rules and learners of which several runs were done together
+# Vectors gather numbers from memory fast on Intel's processors, but slower than loops on AMD's.
+GATHERS = "Intel" in runtime.processor()
 _STEP_NS = 25  # a step of Q-learning on one thread of a slow core
 _WORKSPACE_BYTES = 256 * 2**20
 _MOST_NUMBERS = 2**30  # in one array of a launch, because kernels use 32-bit indices
@@ -216,20 +218,20 @@ class Runs:
         # Imported here, because Taichi must be configured first; see `runtime`.
         from taichi_ants.engines.device_memory import room_for
         from taichi_ants.engines.launch import Launch
-        from taichi_ants.engines.runs.kernels import LANES, run_kernel
+        from taichi_ants.engines.runs.kernels import LANES, learns_at_once, run_kernel
         from taichi_ants.engines.runs.step import Rules
 
         task, state = self.task, self.state
         start_cells, headings = self.world.first_starts(words_of(self.seeds))
         settings, form = runtime.start(), (Rules.of(task), self.learner)
-        # A few runs are faster one by one, and so are those of learners with much memory. But to
-        # load another kernel takes longer than a few short runs.
+        # A few runs are faster one by one, and so are those of learners with much memory or much
+        # to plan. But to load another kernel takes longer than a few short runs.
         several = not traced and 2 * len(self) >= LANES * settings.threads
         if several:
             _TOGETHER.add(form)
         several |= not traced and form in _TOGETHER and episodes * self.max_steps <= _FEW_STEPS
-        several &= self.learner is None or self.learner.td_error is not None
-        lanes = LANES if several and not runtime.compiles_for_gpu() else 1
+        several &= self.learner is None or learns_at_once(self.learner)
+        lanes = LANES if several and GATHERS and not runtime.compiles_for_gpu() else 1
         kernel = partial(run_kernel, *form, traced, lanes)
         launch = Launch(kernel, vars(state).keys() | TRACED, ["outcomes"])
         falls = task.evaporation_in_training if self.learner else task.evaporation_in_evaluation

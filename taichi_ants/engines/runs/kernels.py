@@ -85,6 +85,11 @@ def _lanes_type(n: int) -> Any:
     )
 
 
+def learns_at_once(learner: Learner) -> bool:
+    """Return whether a learner can compute the errors of many runs before the first update."""
+    return learner.td_error is not None and not learner.plans
+
+
 @cache
 def run_kernel(
     rules: Rules, learner: Learner | None, traced: bool, n_lanes: int, arguments: Any
@@ -97,8 +102,7 @@ def run_kernel(
     learns = learner is not None
     on_policy = learns and learner.draws_next_action
     begins = learns and learner.begin is not None
-    # Such learners can compute all errors of a step before the first update.
-    at_once = learns and learner.td_error is not None and not learner.plans
+    at_once = learns and learns_at_once(learner)
     hyperparameters = learner.hyperparameters if learns else Hyperparameters
     read = read_rates(hyperparameters)
     error_of = error_function(learner.td_error) if at_once else None
@@ -109,7 +113,7 @@ def run_kernel(
     draw, chance_of_draw = BY_VALUES.get(rules.choice, (None, None))
     by_one = alone or draw is not None  # whether ants choose one after the other
     # Whether an episode in which no random number mattered is equal to all others of the run.
-    repeats = not (learns or by_one or executes or hooks_at(rules.features)["see"])
+    repeats = not (learns or draw is not None or executes or hooks_at(rules.features)["see"])
     n_states = rules.observation.n_states
     table = n_states * ROW
     # A CPU distributes tasks one by one, as runs are uneven.
@@ -148,6 +152,9 @@ def run_kernel(
                 chance = chance_of_draw(ant_view(a, ant), values, action, explore_below)
         else:
             action = choose(values, bits_of(rng), explore_below)
+            if ti.static(repeats):
+                if lanes.drawn[k] == 0:
+                    lanes.drawn[k] = ti.cast(popcnt(best_actions(values)) > 1, ti.i32)
             if ti.static(traced):
                 chance = chance_of(values, action, explore_below)
         return action, rng, chance
@@ -272,10 +279,13 @@ def run_kernel(
             if ti.static(traced):
                 record_choice(a, lanes, k, executed)
             if ti.static(alone):
+                before = ant.random_state
                 ant = act(
                     *(deposit, True, a, lanes.base[k], ant),
                     *(lanes.paper_state[k], executed, lanes.clock[k]),
                 )
+                if ti.static(repeats):
+                    lanes.drawn[k] |= ti.cast(ant.random_state != before, ti.i32)
             else:
                 ant, enters = move(a, ant, lanes.paper_state[k], executed)
                 lanes.lays[k] = enters & ant.carries

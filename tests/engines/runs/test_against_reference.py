@@ -185,7 +185,6 @@ def test_whole_trainings_of_a_mixed_sweep():
     [
         ("q_learning", "paper", "set", "greedy", NO_NOISE),
         ("sarsa", "paper", "fading", "greedy", NOISE),
-        pytest.param("dyna_q", "paper", "none", "greedy", NO_NOISE, marks=pytest.mark.slow),
         pytest.param("sarsa", "ants", "add", "softmax", NO_NOISE, marks=pytest.mark.slow),
         pytest.param(
             "expected_sarsa", "trail_levels", "set", "greedy", NOISE, marks=pytest.mark.slow
@@ -194,6 +193,7 @@ def test_whole_trainings_of_a_mixed_sweep():
 )
 def test_many_runs_equal_single_ones(learner, observation, deposit, choice, noise, monkeypatch):
     """A task takes many runs together, and more of them than it has lanes for."""
+    monkeypatch.setattr(engine, "GATHERS", True)
     monkeypatch.setattr(engine, "_FEW_STEPS", 0)  # else the single ones could use the same kernel
     seeds = range(-3, 20 * runtime.start().threads)
     drawn = 0
