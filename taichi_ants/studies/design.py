@@ -28,17 +28,18 @@ class Range:
     @classmethod
     def of(cls, name: str, table: Mapping[str, Any], whole: bool) -> Range:
         """Return the range in a table; AntsError, which begins with `name`, if it is not one."""
-        number: Any = int if whole else float
-        ends, scale = [table.get("from"), table.get("to")], table.get("scale", "linear")
+        number: type = int if whole else float
+        ends: Any = table.get("from"), table.get("to")
+        (low, high), scale = ends, table.get("scale", "linear")
         fits = all(type(end) in (int, number) and abs(end) <= 2**53 for end in ends)
-        fits = fits and ends[0] < ends[1] and scale in ("linear", "log")[: 1 + (ends[0] > 0)]
+        fits = fits and low < high and scale in ("linear", "log")[: 1 + (low > 0)]
         if not fits or table.keys() - {"from", "to", "scale"}:
             raise AntsError(
                 f"{name} is {shown(dict(table))}; a range has the keys from and to, which are "
                 f"{'whole ' * whole}numbers, the first the smaller one, and perhaps the scale "
                 "linear or, if both are above 0, log."
             )
-        return cls(*map(number, ends), scale == "log", whole)
+        return cls(number(low), number(high), scale == "log", whole)
 
 
 Axis = Range | Sequence[Any]  # of a sequence, all values are equally frequent
@@ -87,7 +88,8 @@ class Design(Settings):
         if self.design == "grid":
             if ranges := [name for name, axis in axes.items() if isinstance(axis, Range)]:
                 raise AntsError(f"{ranges[0]} is a range, but a grid needs lists; set design.")
-            return [dict(zip(axes, row, strict=True)) for row in itertools.product(*axes.values())]
+            lists: Any = axes.values()
+            return [dict(zip(axes, row, strict=True)) for row in itertools.product(*lists)]
         drawn = varying(axes)
         if not drawn:
             raise AntsError("[vary] has single values only; the design 'sobol' needs more.")
