@@ -1,6 +1,6 @@
 """Draw all pictures of the README and the docs, and publish the tables of the studies.
 
-The scripts `render.py`, `learning.py` and `policy_sheet.py` draw the pictures in `renders/`. The
+`taichi-ants render`, `learning.py` and `policy_sheet.py` draw the pictures in `renders/`. The
 pictures in `docs/figures/`, and the tables of their pages, are those of `results/compare`,
 `results/colony` and `results/bridge`. If results are missing, the script runs the study first. The
 comparison takes less than a minute on two cores; see docs/results/foraging.md and

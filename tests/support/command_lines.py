@@ -1,4 +1,4 @@
-"""Command lines of `experiments/`, run for tests in a new process or in this one."""
+"""Commands of the package and of `experiments/`, run for tests in a new process or in this one."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from taichi_ants.studies.columns import SWEEP
 TABLES = (SWEEP, columns.COMPARE, columns.COLONY, columns.BRIDGE)
 ROOT = Path(__file__).resolve().parents[2]
 EXPERIMENTS = ROOT / "experiments"
+STUDIES = ("compare", "colony", "bridge")  # scripts with studies, not commands of the package
 
 
 def crowding() -> float:
@@ -50,8 +51,10 @@ def environment(kernels: Path, **changes: str | None) -> dict[str, str]:
 
 
 def command(name: str, arguments: Sequence[object]) -> list[str]:
-    """Return the command line of an experiment."""
-    return [sys.executable, str(EXPERIMENTS / f"{name}.py"), *map(str, arguments)]
+    """Return the command line of a script or, if there is none, of a command of the package."""
+    script = EXPERIMENTS / f"{name}.py"
+    what = [str(script)] if script.exists() else ["-m", "taichi_ants", name]
+    return [sys.executable, *what, *map(str, arguments)]
 
 
 def run(
@@ -81,9 +84,6 @@ def start(
         text=True,
         **settings,
     )
-
-
-STUDIES = ("compare", "colony", "bridge")  # scripts with studies, not starters of commands
 
 
 def load(name: str) -> ModuleType:
