@@ -91,7 +91,9 @@ def make_gallery(settings: argparse.Namespace) -> None:
         draw, chosen = drawing([*arguments, "--out", str(path)])
         draw(chosen)
     with chromium() as browser:
-        if browser is not None:
+        if browser is None:
+            print(f"Skipped {VIEWER} and {LIVE}, which need Chromium and Playwright.")
+        else:
             make_viewer(settings.folder / "docs" / "figures", browser)
             make_live(settings.folder / "docs" / "figures", browser)
     if not settings.no_figures:
@@ -115,7 +117,6 @@ def chromium() -> Iterator[Any]:
     except ImportError:
         path = None
     if path is None:
-        print(f"Skipped {VIEWER} and {LIVE}, which need Chromium and Playwright.")
         yield None
         return
     with sync_playwright() as playwright:

@@ -56,14 +56,6 @@ def write(path: Path, tables: Sequence[Table]) -> None:
     write_text(path, "[" + ",\n".join(parts) + "]\n")
 
 
-def publish(name: str, tables: Sequence[Table], figure: Path | None = None) -> None:
-    """Write the tables of a name and a figure to the docs, and fill the pages that show them."""
-    write(data_file(name), tables)
-    if figure is not None:
-        shutil.copyfile(figure, FIGURES / figure.name)
-    fill()
-
-
 def fill() -> None:
     """Write the published tables and numbers into all pages."""
     for page in pages():
@@ -71,10 +63,13 @@ def fill() -> None:
 
 
 def show(name: str, tables: Sequence[Table], publishes: bool, figure: Path | None = None) -> None:
-    """Print tables, and publish them if asked to."""
+    """Print tables; if asked to, write them and a figure to the docs, and fill the pages."""
     print(plain_text(tables, width=120))
     if publishes:
-        publish(name, tables, figure)
+        write(data_file(name), tables)
+        if figure is not None:
+            shutil.copyfile(figure, FIGURES / figure.name)
+        fill()
 
 
 def pages() -> list[Path]:

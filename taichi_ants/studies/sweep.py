@@ -130,13 +130,13 @@ def sweep_of(file: Settings) -> Sweep:
     arrays = base.measures
     if "measure_every" in base.reading:
         arrays += tuple(f"{SERIES}{name}" for name in base.reading["measures"])
-    study = Study(points, base.seeds, arrays, partial(_measured, base.kind, base.measures))
+    study = Study(points, base.seeds, arrays, partial(measured, base.kind, base.measures))
     place = {point: n for n, point in enumerate(study.points)}
     order = [place[point] for point in points]
     return Sweep(base, study, order, rows, grids, drawn, against)
 
 
-def _measured(
+def measured(
     kind: str, wanted: Sequence[str], points: Sequence[Any], seeds: Sequence[int], outcome: Arrays
 ) -> Arrays:
     """Return the measures of a block, float64 (points, seeds)."""
