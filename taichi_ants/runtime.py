@@ -122,7 +122,6 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
 
 
 def _exists(kinds: tuple[type, ...]) -> bool:
-    """Return whether an object of one of these types exists."""
     # There are half a million objects, but only a few thousand types.
     types = {type(thing) for thing in gc.get_objects()}
     return any(issubclass(one, kinds) for one in types)
@@ -206,7 +205,6 @@ def quiet() -> Iterator[None]:
 
 @cache
 def _source_lines(function: Any) -> tuple[list[str], int]:
-    """Return the source lines of a function, and the number of the first one."""
     from taichi.lang._wrap_inspect import getsourcelines
 
     return getsourcelines(function)

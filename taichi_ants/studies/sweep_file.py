@@ -113,9 +113,8 @@ class Base(NamedTuple):
     def axes(self, table: Any) -> dict[str, Axis]:
         """Return the values or ranges of the settings in a [vary] table, by their full names.
 
-        Raises:
-            AntsError: A range is not allowed, or a setting is fixed, too, or of an event, field,
-                caste or food without a table in the file. Points check values.
+        AntsError if a range is not allowed, or a setting is fixed, too, or of an event, field,
+        caste or food without a table in the file. Points check values.
         """
         if not isinstance(table, dict) or not table:
             raise AntsError("[vary] is empty; add lists of values of the settings that vary.")
