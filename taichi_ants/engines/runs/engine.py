@@ -42,7 +42,8 @@ Progress = Callable[[float], None]  # called with the share of the work that is 
 _SECONDS = 1.0
 _FEW_STEPS = 500_000  # of a run
 _TOGETHER = set[Any]()  # rules and learners of which several runs were done together
-# Vectors gather numbers from memory fast on Intel's processors, but slower than loops on AMD's.
+# Lanes need vectors that gather numbers from memory, which compiled kernels have for Intel's
+# processors. Taichi's LLVM 15 does not know AMD's Zen 5, and makes vectors of four numbers for it.
 GATHERS = "Intel" in runtime.processor()
 _STEP_NS = 25  # a step of Q-learning on one thread of a slow core
 _WORKSPACE_BYTES = 256 * 2**20
