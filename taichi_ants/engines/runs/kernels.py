@@ -4,8 +4,8 @@ The data of a run (cells, Q table, memory) are small enough for the processor's 
 
 A task has a lane for each of its runs, and does each part of a step for all lanes in a loop. Loops
 without branches become vector instructions, with which a step of Q-learning takes two thirds of the
-time on an Intel Xeon. Parts that have branches, or that write where other runs could read, are in separate loops.
-When no run is left for a lane, its ant goes on, but nothing is written.
+time on an Intel Xeon. Parts that have branches, or that write where other runs could read, are in
+separate loops. When no run is left for a lane, its ant goes on, but nothing is written.
 """
 
 from collections.abc import Callable
