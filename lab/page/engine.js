@@ -36,7 +36,7 @@
  *   engine.policy(cell, heading, carries)   { state, values, best } of an ant that would stand there
  *
  * CELLS are numbers: engine.at(q, r), engine.q(cell), engine.r(cell), engine.exists(q, r),
- *   engine.disc(cell, reach), engine.line(from, to); STEPS[heading] is the step (q, r) to a neighbour.
+ *   engine.disc(cell, reach); STEPS[heading] is the step (q, r) to a neighbour.
  *
  * LONE ANTS (ant.wasm)
  *   const lone = new LoneAnts(module)
@@ -48,14 +48,13 @@
  */
 
 import FOLLOWERS from "./followers.json" with { type: "json" };
-import { makeWorld } from "./worlds.js";
+import { EMPTY, FOOD, hexDistance, makeWorld, QUEEN, ROCK, STEPS } from "./worlds.js";
 
 /** @typedef {import("./worlds.js").Scene} Scene */
 /** @typedef {{ do: "rock" | "food" | "scent" | "trail" | "erase", reach: number, path: number[], tick?: number }} Stroke */
 /** @typedef {{ do: "ants" | "epsilon" | "rate" | "discount" | "level" | "shaping" | "learns", value: number, tick?: number }} Setting */
 /** @typedef {Stroke | Setting} Change */
 
-export const EMPTY = 0, ROCK = 5, FOOD = 7, QUEEN = 13; // what is on a cell
 export const ACTIONS = ["turn left", "go on", "turn right", "pick up", "give"];
 export const EVENTS = { entered: 0, failed: 1, shaped: 2, pickedUp: 3, delivered: 4 };
 // What ants see: E empty, O obstacle, T trail or S nearer to the nest, F food or Q queen, and ants:
@@ -66,12 +65,8 @@ export const PARTS = { directed: 1, rightOfWay: 2, seesAnts: 4, queues: 8 };
 export const RULES = { paper: 0, foraging: 7, queueing: 15 };
 export const LEARNERS = { q_learning: 0, sarsa: 1, frozen: 2 };
 export const CAPACITY = 10000;
-/** Steps (q, r) to the neighbours of a cell by heading, clockwise; heading 0 points up. */
-export const STEPS = [[1, 0], [1, 1], [0, 1], [-1, 0], [-1, -1], [0, -1]];
 const START_LEVEL = 25;
 
-/** The distance of two cells that are (q, r) apart. */
-export const hexDistance = (q, r) => Math.max(q, r, 0) - Math.min(q, r, 0);
 /** The largest values of settings, as links have them: some in thousandths. */
 export const LIMITS = {
   seed: Number.MAX_SAFE_INTEGER, ants: CAPACITY, epsilon: 1000, rate: 1000, discount: 1000,
@@ -276,18 +271,6 @@ export class Engine {
       for (let a = -reach; a <= reach; a++)
         if (hexDistance(a, b) <= reach && this.exists(q + a, r + b)) found.push(this.at(q + a, r + b));
     return found;
-  }
-  /** A path of adjacent cells between two cells, along the straight line. */
-  line(from, to) {
-    const path = [from], n = hexDistance(this.q(to) - this.q(from), this.r(to) - this.r(from));
-    const apart = (cell) => hexDistance(this.q(to) - this.q(cell), this.r(to) - this.r(cell));
-    const off = (cell) => Math.abs((this.q(cell) - this.q(from)) * (this.r(to) - this.r(from)) - (this.r(cell) - this.r(from)) * (this.q(to) - this.q(from)));
-    for (let left = n - 1, cell = from; left >= 0; left--) {
-      const near = STEPS.map(([q, r]) => cell + q + r * this.width).filter((one) => apart(one) === left);
-      cell = near.reduce((a, b) => (off(b) < off(a) ? b : a));
-      path.push(cell);
-    }
-    return path;
   }
 }
 

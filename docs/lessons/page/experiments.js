@@ -2,7 +2,8 @@
  * the steps of an ant (`walks`); one with `code` checks a function that a student writes, and throws a sentence if it is wrong.
  * No DOM is needed. */
 
-import { hexDistance, LETTERS } from "../../../lab/page/engine.js";
+import { LETTERS } from "../../../lab/page/engine.js";
+import { hexDistance } from "../../../lab/page/worlds.js";
 import { live, PLAN } from "./room.js";
 import { Random } from "./random.js";
 
