@@ -50,12 +50,13 @@ typedef struct {
 
 /* An ant in one of the runs, and the step that it takes. */
 typedef struct {
-    uint64_t explore_below;
+    uint64_t random, explore_below;
+    float learning_rate, discount;
     int32_t cell, heading, carries, state, step, sum;
     int32_t action, taken, reward, delivered, next; /* `action`: that of the next step, for SARSA */
     int32_t *cells;
     int32_t number, episode;
-    Run run; /* its random state and exploration advance */
+    Run run;
     Row rows[N_STATES];
     Model model;
 } Ant;
@@ -125,7 +126,7 @@ static void pick_up(const Shared *shared, Ant *ant)
     for (int k = 0; k < 3; k++)
         if ((ant->state >> (4 - 2 * k) & 3) == SEES_GOAL)
             goals[n++] = k;
-    int position = goals[n > 1 ? below(draw(&ant->run.random) >> 32, n) : 0];
+    int position = goals[n > 1 ? below(draw(&ant->random) >> 32, n) : 0];
     ant->cells[ant->cell + shared->world->offsets[ant->heading + position]] = LEVEL(DEPOSIT);
     ant->cells[ant->cell] = LEVEL(DEPOSIT);
     ant->heading = (ant->heading + 3) % N_HEADINGS;
@@ -188,7 +189,7 @@ INLINE void note_best(const Shared *shared, Row *row)
 
 INLINE int choose(const Row *row, Ant *ant)
 {
-    uint64_t bits = draw(&ant->run.random);
+    uint64_t bits = draw(&ant->random);
     /* All bits are set if the ant explores: a difference that is negative, shifted. */
     uint32_t explores = (uint32_t)((int64_t)((bits >> 32) - ant->explore_below) >> 63);
     uint32_t choices = row->choices ^ ((row->choices ^ ALL_ACTIONS) & explores);
@@ -198,9 +199,9 @@ INLINE int choose(const Row *row, Ant *ant)
 
 INLINE void update(Ant *ant, float *value, int reward, int terminated, float next_value)
 {
-    float discount = terminated ? 0.0f : ant->run.discount;
+    float discount = terminated ? 0.0f : ant->discount;
     float error = (float)reward + discount * next_value - *value;
-    *value += ant->run.learning_rate * error;
+    *value += ant->learning_rate * error;
 }
 
 INLINE void plan(Ant *ant, int action, int terminated, int steps)
@@ -213,7 +214,7 @@ INLINE void plan(Ant *ant, int action, int terminated, int steps)
                        (int16_t)ant->reward, (int16_t)terminated};
     model->transitions[model->place[pair] - 1] = seen;
     for (int k = 0; k < steps; k++) {
-        seen = model->transitions[below(draw(&ant->run.random) >> 32, model->n)];
+        seen = model->transitions[below(draw(&ant->random) >> 32, model->n)];
         float next_value = best_of(ant->rows[seen.next].values);
         update(ant, (float *)ant->rows + seen.value, seen.reward, seen.terminated, next_value);
     }
@@ -277,6 +278,9 @@ static inline int begin_run(Shared *shared, Ant *ant, int learner)
     ant->number = number;
     ant->episode = 0;
     ant->run = shared->runs[number];
+    ant->random = ant->run.random;
+    ant->learning_rate = ant->run.learning_rate;
+    ant->discount = ant->run.discount;
     ant->model.n = 0;
     memset(ant->model.place, 0, sizeof ant->model.place);
     const float *q = shared->job->q + (size_t)number * N_PAIRS;

@@ -166,7 +166,7 @@ INLINE int level_of(const Colony *c, int cell, int clock)
     return level > 0 ? level : 0;
 }
 
-/* The percept of an ant, and if it sees ants the row of its table, which is the percept if not. */
+/* The percept of an ant, and the row of its table, which is the percept if it does not see ants. */
 INLINE int see(const Colony *c, int rules, int cell, int heading, int carries, int clock, int *row)
 {
     int codes[3], levels[3] = {0}, ants[3], nearer, strongest;
@@ -193,7 +193,7 @@ INLINE int see(const Colony *c, int rules, int cell, int heading, int carries, i
             codes[k] = shows ? SEES_CUE : codes[k] & 3;
         }
     }
-    int percept = carries << 6 | codes[0] << 4 | codes[1] << 2 | codes[2];
+    int percept = *row = carries << 6 | codes[0] << 4 | codes[1] << 2 | codes[2];
     if (rules & SEES_ANTS) {
         int index = carries, own = level_of(c, cell, clock);
         for (int k = 0; k < 3; k++) {
@@ -223,18 +223,13 @@ INLINE int after_deposit(const Colony *c, int rules, int cell, int clock, int ca
 /* Whether ants can enter cells with ants. */
 INLINE int shares_cells(int rules) { return (rules & (SWAPS | QUEUES)) != 0; }
 
-INLINE int state_of(int rules, const Ant *ant)
-{
-    return rules & SEES_ANTS ? ant->state : ant->percept;
-}
-
 INLINE void choose_and_want(const Colony *c, const Work *w, int rules, Ant *ant)
 {
     int percept = ant->percept, action = rules & SARSA ? ant->want - 1 : -1;
     uint64_t random = ant->random;
     if (action < 0) {
         random = advance(random);
-        unsigned greedy = w->greedy[state_of(rules, ant)].actions;
+        unsigned greedy = w->greedy[ant->state].actions;
         action = choose(greedy, bits_of(random), c->explore_below);
     }
     int cell = ant->cell, heading = turned(ant->heading, action);
@@ -445,8 +440,6 @@ INLINE int sense_and_learn(const Colony *c, const Work *w, int rules, Ant *ant, 
 {
     int event = ant->event, next = 0, cell = ant->cell, drawn = 0;
     int percept = see(c, rules, cell, ant->heading, ant->carries, clock, &next);
-    if (!(rules & SEES_ANTS))
-        next = percept;
     float next_value = w->greedy[next].best;
     if ((rules & SARSA) && event != DELIVERED) {
         ant->random = advance(ant->random);
@@ -455,7 +448,7 @@ INLINE int sense_and_learn(const Colony *c, const Work *w, int rules, Ant *ant, 
         drawn = 1 + action;
     }
     if (!(rules & FROZEN)) {
-        int pair = state_of(rules, ant) * ROW + ant->action;
+        int pair = ant->state * ROW + ant->action;
         float discount = event == DELIVERED ? 0.0f : c->discount;
         float error = (float)c->rewards[event] + discount * next_value - c->q[pair];
         pairs[n] = pair;
@@ -465,8 +458,7 @@ INLINE int sense_and_learn(const Colony *c, const Work *w, int rules, Ant *ant, 
         errors[pair].latest = error;
     }
     ant->percept = percept;
-    if (rules & SEES_ANTS)
-        ant->state = next;
+    ant->state = next;
     w->wants[cell - (ant->want ? c->steps[ant->want] : 0)] = 0; /* its previous cell */
     if (rules & SARSA)
         ant->want = drawn;
@@ -577,7 +569,7 @@ static void look_around(const Colony *c, const Work *w, int rules, int clock)
         Ant *ant = w->ants + i;
         int row = 0;
         ant->percept = see(c, rules, ant->cell, ant->heading, ant->carries, clock, &row);
-        ant->state = rules & SEES_ANTS ? row : ant->percept;
+        ant->state = row;
     }
 }
 
