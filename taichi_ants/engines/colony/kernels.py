@@ -16,18 +16,9 @@ import taichi as ti
 from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
-from taichi_ants.engines.colony import (
-    columns,
-    layout,
-    learning,
-    life,
-    memory,
-    own_inputs,
-    steps,
-    trail,
-)
+from taichi_ants.engines.colony import layout, learning, life, memory, own_inputs, steps, trail
 from taichi_ants.engines.colony.barrier import next_group, part_of, share_of_part
-from taichi_ants.engines.colony.columns import chunks_of, function, share_of
+from taichi_ants.engines.colony.columns import chunks_of, function, share_of, trait
 from taichi_ants.engines.colony.layout import Order, WorldRow
 from taichi_ants.engines.colony.views import entries_of
 from taichi_ants.features import hooks_at
@@ -204,7 +195,7 @@ def is_taken(c, v, ant):
     """Return whether an ant is in a slot; without vacant slots, always, while a kernel compiles."""
     taken = True
     if ti.static(v.slots_matter):
-        taken = columns.trait(c.stage, ant) != layout.Stage.VACANT
+        taken = trait(c.stage, ant) != layout.Stage.VACANT
     return taken
 
 

@@ -15,13 +15,7 @@ import numpy as np
 
 from taichi_ants import arguments, runtime
 from taichi_ants.engines.layout import OUTCOMES, TRACE
-from taichi_ants.engines.runs.engine import (
-    MAX_ROLLOUT_STEPS,
-    Progress,
-    Runs,
-    RunState,
-    memory_for,
-)
+from taichi_ants.engines.runs.engine import MAX_ROLLOUT_STEPS, Progress, Runs, RunState, memory_for
 from taichi_ants.engines.runs.results import RolloutArguments, Rollouts, Trace, TrainingResult
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.learners.config import TrainingConfig
