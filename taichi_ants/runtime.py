@@ -206,7 +206,6 @@ def quiet() -> Iterator[None]:
 
 @cache
 def _source_lines(function: Any) -> tuple[list[str], int]:
-    """Return the source lines of a function, and the number of the first one."""
     from taichi.lang._wrap_inspect import getsourcelines
 
     return getsourcelines(function)

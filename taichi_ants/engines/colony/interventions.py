@@ -277,7 +277,6 @@ class _World:
         return slots[to >= 0], to[to >= 0]
 
     def _step_aside(self, ants: np.ndarray, to: np.ndarray) -> None:
-        """Move the ants in some slots to other cells."""
         ground, at = self.view("ground"), self.view("cell")[ants]
         self.view("cell")[ants] = to
         ground[to] = ground[at]
@@ -326,7 +325,6 @@ class _World:
         self._count_ants()
 
     def _remove(self, slots: np.ndarray) -> None:
-        """Remove the ants in some slots."""
         colony = self.colony
         numbers = self.view("number")[slots]
         first = numbers < colony.ants  # their streams continue in the next episode

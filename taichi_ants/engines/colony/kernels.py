@@ -106,7 +106,6 @@ class Variant:
         )
 
     def dense_fields(self, c: Any) -> list[trail.PheromoneArrays]:
-        """Return the arrays and numbers of the dense pheromones."""
         return [self.field(c, number) for number, dense in enumerate(self.dense_by_number) if dense]
 
 

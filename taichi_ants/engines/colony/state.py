@@ -410,7 +410,6 @@ class ColonyState:
         first_streams[worlds, self.numbers[worlds, slots]] = self.streams[worlds, slots]
 
     def _set_learning_rate(self, learning_rate: float) -> None:
-        """Set the learning rate and the update weights."""
         self.learning_rate = learning_rate
         weights, kept = self._update_weights(learning_rate), self.arrays["weights"]
         if len(weights) > len(kept):  # rare, because Taichi leaks some bytes for each new array
@@ -512,7 +511,6 @@ class ColonyState:
                 self.at_start[name][:] = np.where(is_food, values, 0).reshape(-1)
 
     def _pheromone_arrays(self, n: int) -> Arrays:
-        """Return empty arrays (n,) of all pheromones."""
         return {
             layout.array_of(number, dense): np.zeros(n, np.float32 if dense else np.int32)
             for number, dense in enumerate(self._model.dense_by_number)
@@ -530,7 +528,6 @@ class ColonyState:
                 slots[which, :n] = np.broadcast_to(starts[name], (shape[0], n))[which]
 
     def _lasting(self, q_values: np.ndarray | None) -> Arrays:
-        """Return the arrays that last through all episodes."""
         slots, memory, n_worlds = self.capacity, self.memory, len(self.seeds)
         owners = n_worlds * self._owners
         sizes = ((1 + memory.tables) * self.task.n_states * ROW, memory.floats, memory.integers)
@@ -626,7 +623,6 @@ class ColonyState:
         return settings
 
     def _ground_constants(self) -> Arrays:
-        """Return the constants that depend on the world."""
         return {
             # 1 for rocks and outside.
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
@@ -655,7 +651,6 @@ class ColonyState:
     # Files
 
     def _contents(self) -> tuple[dict[str, Any], Arrays]:
-        """Return the contents of a file: facts and arrays."""
         arrays = {f"array_{name}": self.arrays[name] for name in self.stored}
         places = {world: place for place, world in enumerate(dict.fromkeys(self.worlds))}
         facts = {

@@ -242,7 +242,6 @@ class TickingColony(ColonyState):
             yield
 
     def _advance(self, n: int) -> None:
-        """Advance the colony by n ticks."""
         if self.schedule == BY_ANT:
             self._advance_by_ant(n)
             return
@@ -364,7 +363,6 @@ class TickingColony(ColonyState):
 
 
 def kernel_numbers(state: ColonyState) -> dict[str, Any]:
-    """Return the numbers that kernels read in addition to arrays."""
     memory, fields = state.memory, state.task.fields.values()
     of_fields: dict[str, float] = {}
     if fields:

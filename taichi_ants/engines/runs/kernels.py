@@ -101,7 +101,6 @@ def run_kernel(
 
     @ti.func
     def ant_of(lanes: ti.template(), k):
-        """Return the ant in lane k."""
         return Ant(
             cell=lanes.cell[k],
             heading=lanes.heading[k],
@@ -113,7 +112,6 @@ def run_kernel(
 
     @ti.func
     def keep(lanes: ti.template(), k, ant):
-        """Make `ant` the ant in lane k."""
         lanes.cell[k], lanes.heading[k] = ant.cell, ant.heading
         lanes.carries[k], lanes.carried[k] = ant.carries, ant.carried
         lanes.event[k], lanes.random_state[k] = ant.event, ant.random_state
@@ -207,7 +205,6 @@ def run_kernel(
 
     @ti.func
     def record_choice(a: ti.template(), lanes: ti.template(), k, executed):
-        """Record what is known of a step before the action."""
         row = lanes.recorded[k]
         a.trace_chances[row] = lanes.chance[k]
         a.trace[row, 0], a.trace[row, 1] = lanes.episode[k], lanes.step[k]
@@ -217,7 +214,6 @@ def run_kernel(
 
     @ti.func
     def record_result(a: ti.template(), lanes: ti.template(), k):
-        """Record the rest of a step."""
         row, event = lanes.recorded[k], lanes.event[k]
         a.trace[row, 7], a.trace[row, 8] = a.rewards[event], lanes.paper_state[k]
         a.trace[row, 9], a.trace[row, 10] = lanes.next_state[k], lanes.terminated[k]
@@ -336,7 +332,6 @@ def run_kernel(
 
     @ti.func
     def rates_of(a: ti.template(), lanes: ti.template(), k):
-        """Return the rates of the run in lane k."""
         return read(
             *(lanes.learning_rate[k], lanes.discount[k], lanes.epsilon[k]),
             *(a.settings, lanes.settings[k] + N_SETTINGS),
@@ -344,7 +339,6 @@ def run_kernel(
 
     @ti.func
     def taken_in(a: ti.template(), lanes: ti.template(), k):
-        """Return the step that was taken in lane k."""
         return Transition(
             state=lanes.state[k],
             action=lanes.action[k],

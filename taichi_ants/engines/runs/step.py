@@ -294,7 +294,6 @@ def laid_behind(deposit: ti.template(), a: ti.template(), base, ant, clock):
 
 @ti.func
 def lay_behind(deposit: ti.template(), a: ti.template(), base, cell, clock, carried):
-    """Deposit on the cell that an ant with food has entered."""
     if ti.static(deposit != NONE):
         lay(deposit, a, base, cell, clock, a.cells[base + cell], carried)
 

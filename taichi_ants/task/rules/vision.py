@@ -143,7 +143,6 @@ def misread_paper_state(paper_state, random_state, hooks: ti.template(), ant: ti
 
 @while_compiling
 def entry_of(view: Any, name: str) -> Any:
-    """Return a vector of a view by its name, while a kernel compiles."""
     return getattr(view, name)
 
 
