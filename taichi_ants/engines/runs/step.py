@@ -9,11 +9,11 @@ from taichi.lang.impl import subscript
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import draw_below
-from taichi_ants.engines.views import encode_function, fill_codes, view_type
+from taichi_ants.engines.views import fill_codes, view_type
 from taichi_ants.features import NUMBERS, hooks_at, used_by
 from taichi_ants.features.feature import Feature
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.kernel_functions import Named, while_compiling
+from taichi_ants.kernel_functions import Named, kernel_function, while_compiling
 from taichi_ants.task import Task
 from taichi_ants.task.constants import FOOD, FORWARD, LEFT, PICK_UP, QUEEN, RIGHT, Event, Reason
 from taichi_ants.task.observations import Observation
@@ -184,7 +184,7 @@ def observe_function(rules: Rules, predictable: bool) -> Callable[..., Any]:
     in_view = observation.cells
     left, forward, right = observation.ahead
     sees = hooks_at(rules.features)["see"]
-    view_of, encode = view_type(observation, False), encode_function(observation)
+    view_of, encode = view_type(observation, False), kernel_function(observation.encode)
 
     @ti.func
     def see(a: ti.template(), base, ant, clock):
