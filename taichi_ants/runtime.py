@@ -135,12 +135,6 @@ def _exists(kinds: tuple[type, ...]) -> bool:
     return any(issubclass(one, kinds) for one in types)
 
 
-def check_on_cpu(running: Runtime, what: str) -> None:
-    """Raise AntsError if Taichi runs on a GPU, for kernels whose threads wait for each other."""
-    if running.arch != "cpu":
-        raise AntsError(f"arch is {running.arch!r}, but {what} only on the CPU; use arch='cpu'.")
-
-
 def compiles_for_gpu() -> bool:
     """Return whether kernels are compiled for a GPU, by a Taichi that runs."""
     import taichi as ti
@@ -220,7 +214,6 @@ def _source_file(function: Any) -> str:
 
 @cache
 def _source_lines(function: Any) -> tuple[list[str], int]:
-    """Return the source lines of a function, and the number of the first one."""
     from taichi.lang._wrap_inspect import getsourcelines
 
     return getsourcelines(function)

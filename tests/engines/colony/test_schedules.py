@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from taichi_ants import Colony, TrainingConfig, train, worlds
-from taichi_ants.engines.colony import barrier, state, stepping
+from taichi_ants.engines.colony import barrier, layout, stepping
 from taichi_ants.engines.colony.layout import Order
 from taichi_ants.engines.colony.stepping import ThreadChoice
 from taichi_ants.task import Field, Life, Pheromone, Task
@@ -54,7 +54,7 @@ def assert_same(first: dict, second: dict) -> None:
 
 def use_chunks(monkeypatch, n: int) -> None:
     """Let worlds have n chunks, for any number of threads."""
-    monkeypatch.setattr(state, "most_chunks", lambda *sizes: n)
+    monkeypatch.setattr(layout, "most_chunks", lambda *sizes: n)
     monkeypatch.setattr(stepping, "chunks_for", lambda *sizes: n)
 
 
