@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 from dataclasses import replace
 
+import colony
 import numpy as np
 import pytest
-from command_lines import contents, read_csv, run
+from command_lines import contents, read_csv
 
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, worlds
 from taichi_ants.task import foraging, queueing
@@ -31,12 +34,15 @@ FILES = {
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory, kernels):
+def finished(tmp_path_factory):
     """Return the output of one run of the script, and its folder, which is not to be changed."""
-    place = tmp_path_factory.mktemp("finished")
-    done = run("colony", [*SMALL, "--out", "out"], kernels, place)
-    assert (done.returncode, done.stderr) == (0, "")
-    return done.stdout, place / "out"
+    place, out = tmp_path_factory.mktemp("finished"), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out):
+        patch.chdir(place)
+        with pytest.raises(SystemExit) as ended:
+            colony.main([*map(str, SMALL), "--out", "out"])
+    assert ended.value.code == 0
+    return out.getvalue(), place / "out"
 
 
 @pytest.mark.slow
@@ -84,9 +90,9 @@ def test_the_numbers_are_those_of_the_library(finished):
     alone = Colony(worlds.paper(), rules, TRAINING, SEEDS)
     alone.run(EPISODES, TICKS)
     table = {"sharing": "frozen", "q_values": alone.q_values}
-    colony = Colony(worlds.paper(), rules, CALM, OTHERS, 3, **table)
+    lives = Colony(worlds.paper(), rules, CALM, OTHERS, 3, **table)
     condition = ("paper", "foraging", "alone", "3")
-    assert_measured(folder, condition, colony.run(ROLLOUTS, TICKS))
+    assert_measured(folder, condition, lives.run(ROLLOUTS, TICKS))
 
 
 @pytest.mark.slow
@@ -101,8 +107,8 @@ def test_ants_are_evaluated_in_worlds_that_they_have_not_seen(finished):
     together.run(EPISODES, TICKS, worlds=places)
     small = [worlds.open_world(seed, (15, 15, 15)) for seed in SEEDS]
     table = {"sharing": "frozen", "q_values": together.q_values}
-    colony = Colony(small, rules, CALM, OTHERS, 3, **table)
-    assert_measured(folder, ("small", "queueing", "open", "3"), colony.run(ROLLOUTS, TICKS))
+    lives = Colony(small, rules, CALM, OTHERS, 3, **table)
+    assert_measured(folder, ("small", "queueing", "open", "3"), lives.run(ROLLOUTS, TICKS))
 
 
 def assert_measured(folder, condition, outcome):
