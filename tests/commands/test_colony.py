@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
 from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_lines import EXPERIMENTS, assert_one_sentence, call, environment
+from command_lines import EXPERIMENTS, assert_one_sentence, call
 
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
 from taichi_ants.commands import colony as command
@@ -175,26 +173,3 @@ def test_rules_are_those_named_else_the_policys_else_queueing(
         policy = load_policy(tmp_path / "a.npz")
     settings = command.parse_arguments(["live", *map(str, arguments)])
     assert command.rules(settings, policy) == expected
-
-
-def test_help_is_quick_and_needs_no_taichi(tmp_path):
-    script = (
-        "import sys\n"
-        "from taichi_ants.commands import run\n"
-        "try:\n"
-        "    run('colony', ['live', '--help'])\n"
-        "except SystemExit as end:\n"
-        "    assert end.code == 0\n"
-        "heavy = {'taichi', 'numpy', 'scipy', 'matplotlib', 'rich'} & set(sys.modules)\n"
-        "print('heavy:', sorted(heavy))\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        env=environment(tmp_path),
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert done.stdout.endswith("heavy: []\n")
-    for word in ("--ants", "--save", "--resume", "--render", "--task.pheromone.half-life"):
-        assert f"  {word}" in done.stdout

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 from itertools import islice
 
 import numpy as np
@@ -13,7 +12,6 @@ from taichi_ants import AntsError, Colony, Task, TrainingConfig, worlds
 from taichi_ants.commands.colony import live, summary
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.rendering import writers
-from taichi_ants.studies.interruption import held, stoppable
 
 TASK = Task(delivery="truncates", evaporation_in_training=True)
 TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
@@ -51,24 +49,6 @@ def test_a_colony_is_saved_although_its_picture_cannot_be(
     assert saved.ticks == ticks
     np.testing.assert_array_equal(saved.cells, other.cells)
     np.testing.assert_array_equal(saved.q_values, other.q_values)
-
-
-def test_a_stopped_colony_ends_at_a_whole_tick_with_all_its_files(tmp_path, capsys) -> None:
-    def progress(share: float) -> None:
-        os.kill(os.getpid(), signal.SIGTERM)
-
-    colony = begun()
-    save, render = str(tmp_path / "keep.npz"), str(tmp_path / "a.gif")
-
-    def work() -> None:
-        with stoppable(), held() as stopped:
-            live(colony, 10, progress, stopped, save, render, frame_interval=2)
-
-    with pytest.raises(SystemExit) as end:
-        work()
-    assert (end.value.code, colony.ticks) == (143, 1)
-    assert Colony.load(save).ticks == 1
-    assert (tmp_path / "a.gif").exists()
 
 
 def test_the_summary_counts_in_words() -> None:

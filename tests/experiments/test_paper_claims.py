@@ -19,7 +19,6 @@ from paper.comparison import (
 from synthetic_comparison import Edit, build, change, level_truth, remeasured, unchanged
 
 from taichi_ants.analysis.findings import (
-    SIMULTANEOUS_LEVEL,
     Criterion,
     Finding,
     Verdict,
@@ -212,17 +211,6 @@ def test_a_finding_shows_the_weakest_contrast_and_what_it_rests_on() -> None:
     assert true.contrast.seeds == 16
     assert true.low < true.effect < true.high
     assert only(build({"truncates": unchanged}), "dyna-below-q-peak").contrast.seeds == 8
-
-
-def test_levels_are_corrected_for_all_intervals_of_all_tested_claims() -> None:
-    claims = [BY_ID["q-return-highest"], BY_ID["discount-q"], BY_ID["greedy-return"]]
-    comparison = build({"truncates": unchanged, "terminates": unchanged})
-    intervals = 2 * (3 + 1 + 4)  # of the IQM and of the mean
-    for findings in assess(comparison, claims).values():
-        for one in findings.values():
-            assert one.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * intervals))
-    shares = only(comparison, "overall-improvement-reliable")
-    assert shares.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 4))
 
 
 def test_the_tables_hold_the_findings() -> None:

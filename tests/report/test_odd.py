@@ -182,19 +182,6 @@ def test_a_study_without_learning_has_no_parameters_of_learning():
     assert "| `entropy.a` | entropy of each pheromone field" in text
 
 
-def test_carriers_follow_has_its_value():
-    task = Task().replace(
-        choice={"rule": "deneubourg", "carriers_follow": "home"}, fields={"home": {}}
-    )
-    text = of_task(task)
-    found = values_in(text)
-    assert found["task.choice.carriers_follow"] == "home"
-    assert (found["task.choice.k"], found["task.choice.exponent"]) == ("20", "2")
-    assert found.keys().isdisjoint({"task.choice.temperature", "evaluation_epsilon"})
-    assert "Ants with food compare the levels of `home`." in text
-    assert "ε" not in text
-
-
 def test_points_that_differ_have_all_values_of_those_that_use_a_setting():
     tasks = [Task(), Task().replace(pheromone={"deposit": "fading", "slope": 3})]
     points = [ColonyPoint(worlds.paper(), task, SARSA, ants=n) for task in tasks for n in (2, 9)]
@@ -267,13 +254,6 @@ def test_each_sentence_is_said_where_its_settings_hold():
     assert "In some of the points: With probability 0.5, an ant executes" in text
     assert "ants are born" not in text
     assert "*Traffic.*" not in text
-
-
-def test_rows_of_tables_have_as_many_cells_as_their_heads():
-    blocks = [one for one in of_task(foraging(), capacity=9).split("\n\n") if one[0] == "|"]
-    assert len(blocks) == 5
-    for block in blocks:
-        assert len({line.replace("\\|", "").count("|") for line in block.strip().split("\n")}) == 1
 
 
 def test_the_guide_shows_a_part_of_a_real_description():

@@ -35,14 +35,6 @@ def refused(parser, arguments, capsys):
     return capsys.readouterr().err
 
 
-def test_values_and_defaults(parser):
-    arguments = ["--size", "9", "--seed", "-4", "--count", "2", "--rates", "1", "2", "3", "--loud"]
-    parsed = vars(parser.parse_args(arguments))
-    assert parsed == {**{"size": 9, "seed": -4, "count": 2, "rates": [1.0, 2.0, 3.0]}, "loud": True}
-    parsed = vars(parser.parse_args([]))
-    assert parsed == {**{"size": 3, "seed": 0, "count": None, "rates": (0.1, 2.0)}, "loud": False}
-
-
 def test_what_was_given_is_told_even_where_it_is_the_default(parser):
     settings, given = parser.parse_given(["--size=3", "--rates", "1", "-2", "--loud"])
     assert given == {"size": "--size", "rates": "--rates", "loud": "--loud"}

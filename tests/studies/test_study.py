@@ -288,17 +288,6 @@ def test_runs_that_are_missing_are_read_as_nan_or_0(tmp_path):
     assert found["number"].tolist() == [[1, 0]]
 
 
-def test_an_interruption_loses_one_block_at_most(study, tmp_path):
-    def stop(share):
-        if share > 0.4:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run(study, Store(tmp_path), progress=stop)
-    assert 1 <= len(files_in(tmp_path)) < len(list(study.blocks(np.ones((5, 5), bool))))
-    assert same(outcomes_of(study, tmp_path), outcomes_of(study, tmp_path / "other"))
-
-
 @pytest.mark.parametrize(
     ("point", "change", "says"),
     [
