@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plain_search import PlainWorld, search_all_sequences, search_optimal, search_shortest
+from plain_search import PlainWorld, search_optimal, search_shortest
 
 from taichi_ants.analysis import bounds as exact_bounds
 from taichi_ants.analysis.bounds import EpisodeBounds, ExpectedEpisode
@@ -65,13 +65,6 @@ def test_bounds_agree_with_plain_searches_for_any_rewards(
     value, outcome = bounds.optimal(0.5, max_steps)
     assert value == pytest.approx(expected_value, abs=1e-9)
     assert_outcome(outcome, expected)
-
-
-def test_the_shortest_delivery_is_that_of_all_sequences_of_actions() -> None:
-    # Queen, ant, trail, food in a row; the ant faces away from the queen.
-    world = World((4, 1, 1), (0, 0, 0), [(3, 0, 0)], trails=[((2, 0, 0), 1)], ants=[((1, 0, 0), 0)])
-    shortest = search_all_sequences(PlainWorld(world), 6)
-    assert bounds_of(world).shortest() == ExpectedEpisode(*shortest) == ExpectedEpisode(15, 4, 1)
 
 
 # The world of the paper. On the line of the cells (i, 0, 0) the queen is at i = -9, the ant at

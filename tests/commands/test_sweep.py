@@ -11,9 +11,6 @@ from command_lines import EXPERIMENTS, assert_one_sentence, contents, numbers_in
 
 from taichi_ants import (
     AntsError,
-    Colony,
-    Life,
-    Pheromone,
     Rewards,
     Task,
     TrainingConfig,
@@ -21,7 +18,7 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.studies.points import EVALUATION_SEEDS, RunPoint
+from taichi_ants.studies.points import RunPoint
 from taichi_ants.studies.sweep import plan, sweep_of
 from taichi_ants.task import foraging, paper
 
@@ -117,24 +114,6 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
     assert "learning_rate epsilon shaping" in report
     facts = json.loads((folder / "study.json").read_text("utf-8"))["settings"]
     assert (facts["task.delivery"], facts["seeds"]) == ("truncates", [7, 2, 5])
-
-
-def test_a_sweep_of_colonies_is_what_the_library_gives(sweep):
-    status, _, err = sweep(COLONY, "--no-figures")
-    assert (status, err) == (0, "")
-    rows = read_csv("results/sweep-my/runs.csv")
-    assert [row["task.pheromone.half_life"] for row in rows] == ["5", "5", "10", "10", "20", "20"]
-    several = [worlds.open_world(5 + seed, (12, 12, 12)) for seed in (0, 1)]
-    pheromone = Pheromone("exponential", half_life=10)
-    task = Task(pheromone=pheromone, evaporation_in_training=True, life=Life(regrowth=0))
-    colony = Colony(several, task, TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.9), (0, 1), 4)
-    colony.run(2, 60)
-    greedy = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
-    others = (EVALUATION_SEEDS, EVALUATION_SEEDS + 1)
-    table = colony.q_values
-    after = Colony(several, task, greedy, others, 4, sharing="frozen", q_values=table).run(2, 60)
-    expected = after.deliveries.mean(axis=0) * 1000 / 60
-    assert [float(row["deliveries"]) for row in rows[2:4]] == pytest.approx(expected.tolist())
 
 
 def test_figures_are_added_to_finished_results_without_new_runs(sweep, monkeypatch):

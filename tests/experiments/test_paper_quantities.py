@@ -18,7 +18,6 @@ from paper.quantities import (
 from synthetic_comparison import build, remeasured, subset, unchanged
 
 from taichi_ants.analysis.findings import above, judge
-from taichi_ants.analysis.statistics import bootstrap_interval
 
 AT_FIGURE_1, MEAN_OF_ALL = READS["at figure 1"], READS["mean of all"]
 
@@ -111,12 +110,3 @@ def test_jackknife_values_remove_the_bias_of_noise() -> None:
 
 def variance(means: np.ndarray) -> np.ndarray:
     return means.var(axis=0, ddof=1)
-
-
-def test_the_interval_of_jackknife_values_covers_the_statistic() -> None:
-    """Three true means with variance 1, 30 seeds of noise."""
-    noise = np.random.default_rng(4).normal(0, 1, size=(1500, 3, 30))
-    samples = noise + np.array([-1.0, 0.0, 1.0])[:, None]
-    values = np.stack([jackknife_values(variance, sample) for sample in samples])
-    low, high = bootstrap_interval(values, resamples=2000)
-    assert 0.92 < np.mean((low <= 1.0) & (high >= 1.0)) < 0.98
