@@ -135,18 +135,15 @@ def test_measures_of_a_plugin_work_for_lone_ants_and_for_colonies(sweep):
     assert [float(row["pace"]) for row in rows] == pytest.approx(pace)
     assert [float(row["worst"]) for row in rows] == result.returns.min(axis=0).tolist()
     assert {row["measure"] for row in rows_of("series.csv")} == {"pace"}
-    asked = '"pace_all", "greedy_pace", "pace_fluctuation_all", "worst"'
-    lone = f"""
+    lone = """
 kind = "runs"
-measures = [{asked}]
+measures = ["pace_all", "greedy_pace", "worst"]
 seeds = 2
 episodes = 5
 rollouts = 3
 max_steps = 80
-training = {{learner = "sarsa", discount = 0.9, epsilon = 0.3, epsilon_decay = 1.0}}
-
-[vary]
-training.learning_rate = [0.1, 0.2]
+training = {learner = "sarsa", discount = 0.9, epsilon = 0.3, epsilon_decay = 1.0}
+vary.training.learning_rate = [0.1, 0.2]
 """
     assert sweep(lone, "--plugin", "yours.py", "--no-figures", "--force")[0] == 0
     config = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 1.0)
