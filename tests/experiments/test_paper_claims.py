@@ -199,20 +199,6 @@ def test_seeds_pair_the_rows() -> None:
     assert blurred.verdict is Verdict.UNDECIDED
 
 
-def test_a_finding_shows_the_weakest_contrast_and_what_it_rests_on() -> None:
-    comparison = build({"truncates": unchanged, "terminates": P3_HIGH})
-    true = only(comparison, "q-return-highest")
-    false = only(comparison, "q-return-highest", "terminates")
-    # Returns at the configurations of table 2: 52, SARSA 43, p3 45, p5 48.6.
-    assert true.contrast.label == "Q-learning minus Dyna-Q (p5)"
-    assert true.effect == pytest.approx(3.4, abs=0.2)
-    assert false.contrast.label == "Q-learning minus Dyna-Q (p3)"
-    assert false.effect == pytest.approx(-13, abs=0.2)
-    assert true.contrast.seeds == 16
-    assert true.low < true.effect < true.high
-    assert only(build({"truncates": unchanged}), "dyna-below-q-peak").contrast.seeds == 8
-
-
 def test_the_tables_hold_the_findings() -> None:
     comparison = build({"truncates": unchanged, "terminates": SARSA_HIGH}, variants=VARIANTS[:3])
     audit = assess(comparison)
