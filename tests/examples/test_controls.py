@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ant_system import Search, search
-from command_lines import EXPERIMENTS
+from command_lines import EXPERIMENTS, run
 from matplotlib.figure import Figure
 from utility import Foraging
 
@@ -373,3 +373,19 @@ def test_td_errors_of_hysteretic_q_learning_by_hand(script, value, reward, large
     td_error = script("plugins/hysteretic")["td_error"]
     next_values = np.array([-9.0, largest, -9.0, -9.0, -9.0])
     assert td_error(value, reward, 0.5, next_values, 0, 0.3) == pytest.approx(error)
+
+
+# experiments/offline.py
+
+
+@pytest.mark.long
+def test_offline_prints_three_tables(kernels, tmp_path):
+    done = run("offline", ["--seeds", 2], kernels, tmp_path)
+    assert done.returncode == 0, done.stderr
+    behaviours = ("random", "epsilon", "a learner's")
+    tables = [table.splitlines() for table in done.stdout.split("─\n")[1:]]
+    rows = [[line for line in lines if line.startswith(behaviours)] for lines in tables]
+    assert list(map(len, rows)) == [4 * 5, 3 * 3 * 3, 2 * 3 * 2]
+    # With what exploits its knowledge, every learner delivers.
+    best = [line for line in rows[0] if line.startswith("epsilon 0.1") and " 100000 " in line]
+    assert best[0].count("1.00 [1.00, 1.00]") == 4

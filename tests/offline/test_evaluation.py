@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import plain_offline as plain
 import pytest
-from plain_data import behaviour_of, episodes_of, random_data
+from plain_offline import behaviour_of, episodes_of, random_data
 from random_worlds import random_world
 
 from taichi_ants import AntsError, Task, record, worlds

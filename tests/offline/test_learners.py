@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import plain_offline as plain
 import pytest
-from plain_data import episodes_of, random_data
+from plain_offline import episodes_of, random_data
 from random_worlds import random_world
 
 from taichi_ants import (
