@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from command_lines import ROOT
 from taichi_ants import AntsError, TrainingConfig, files, worlds
 from taichi_ants.protocol import At, Every
 from taichi_ants.report.odd import Model, described
-from taichi_ants.settings import MISSING, all_of, declared, flat
+from taichi_ants.settings import all_of, declared, flat, nested
 from taichi_ants.studies.points import ColonyPoint, FixedPolicy, RunPoint, settings_of
 from taichi_ants.studies.sweep import plan, sweep_of
 from taichi_ants.task import Field, Food, Task, foraging
@@ -59,26 +60,15 @@ def drawn(one, rng):
 
 
 def random_task(rng):
-    """A task with several changes that fit together, and further fields and kinds of food."""
-    task = Task()
-    if rng.random() < 0.5:
-        laid = str(rng.choice(["without_food", "always", "never"]))
-        home = {"deposited_when": laid, "deposit": "fading", "slope": int(rng.integers(1, 9))}
-        task = task.replace(fields={"home": home}, homing_cue="home")
-    if rng.random() < 0.3:
-        task = task.replace(foods={"seed": Food(loads=3)})
-    scalars = [one for one in all_of(Task) if not one.is_group and one.default is not MISSING]
-    scalars = [one for one in scalars if one.kind in (bool, int, float) or one.allowed_words]
+    """A task with a field and kinds of food, and several changes that fit together."""
+    task = Task().replace(fields={"home": {"deposited_when": "always"}}, foods={"seed": {}})
+    scalars = [one for one in all_of(Task) if one.kind in (bool, int, float) or one.allowed_words]
     scalars = [one for one in scalars if len(one.allowed_words) != 1]
-    for one in rng.choice(np.array(scalars, object), 8, replace=False):
-        setting = next(each for each in scalars if each.path == one[1])
-        change = {setting.path.split(".")[-1]: drawn(setting, rng)}
-        for part in reversed(setting.path.split(".")[1:-1]):
-            change = {part: change}
-        try:
-            task = task.replace(**change)
-        except AntsError:
-            continue
+    for number in rng.permutation(len(scalars))[:8]:
+        one = scalars[number]
+        with suppress(AntsError):
+            change = {one.path.removeprefix("task."): drawn(one, rng)}
+            task = task.replace(**nested(change))
     return task
 
 
