@@ -32,11 +32,7 @@ seeds = [7, 2, 5, 1]
 episodes = 6
 max_steps = 60
 rollouts = 3
-[training]
-learner = "sarsa"
-discount = 0.9
-epsilon = 0.3
-epsilon_decay = 0.99
+training = {learner = "sarsa", discount = 0.9, epsilon = 0.3, epsilon_decay = 0.99}
 [vary]
 training.learning_rate = [0.01, 0.1, 0.2]
 task.rewards.shaping = [1, 0]

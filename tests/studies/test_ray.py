@@ -31,11 +31,7 @@ seeds = 1000
 episodes = 300
 max_steps = 600
 rollouts = 3
-[training]
-learner = "sarsa"
-discount = 0.9
-epsilon = 0.3
-epsilon_decay = 0.99
+training = {learner = "sarsa", discount = 0.9, epsilon = 0.3, epsilon_decay = 0.99}
 [vary]
 training.learning_rate = [0.01, 0.1, 0.2]
 task.rewards.shaping = [1, 0]
