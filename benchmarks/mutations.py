@@ -25,7 +25,6 @@ TIMEOUT = 300.0  # seconds; a mutation that makes tests take longer counts as no
 RUNS = "tests/engines/runs/test_against_reference.py"
 BATCHED = "tests/engines/runs/test_batched.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
-CONFLICTS = "tests/engines/colony/test_conflicts.py"
 NESTS = "tests/engines/colony/test_nests.py"
 RASTER = "tests/rendering/test_raster.py"
 CASTES = "tests/engines/colony/test_castes.py"
@@ -109,7 +108,7 @@ MUTATIONS = [
     ("features/foods.py", "slots], state.kinds[w, slots]", "slots], 0", NESTS),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
-    ("task/rules/conflicts.py", "(other, tick) > key", "(other, tick) < key", CONFLICTS),
+    ("task/rules/conflicts.py", "(other, tick) > key", "(other, tick) < key", COLONY),
     ("engines/colony/steps.py", "(index != queen)", "(index < 0)", NESTS),
     ("features/foods.py", "left = cell.loads - 1", "left = cell.loads - 2", NESTS),
     ("engines/colony/life.py", "put(c.nest, ant, nest)", "put(c.nest, ant, 0)", COLONY),
@@ -119,9 +118,9 @@ MUTATIONS = [
         "task/rules/conflicts.py",
         "rivals_left &= rivals_left - ti.u64(1)",
         "rivals_left = ti.u64(0)",
-        CONFLICTS,
+        COLONY,
     ),
-    ("task/rules/conflicts.py", "compass[N_HEADINGS - i]", "compass[i + 1]", CONFLICTS),
+    ("task/rules/conflicts.py", "compass[N_HEADINGS - i]", "compass[i + 1]", COLONY),
     ("engines/colony/steps.py", "enters &= actions.MOVES >> action", "enters &= 1", COLONY),
     ("engines/colony/steps.py", "goes = cell + enters * (wanted - cell)", "goes = wanted", COLONY),
     (
@@ -137,7 +136,7 @@ MUTATIONS = [
     ("task/rules/actions.py", "turns_at_queen == 1", "turns_at_queen == 0", RUNS),
     ("task/rules/actions.py", "(is_last | delivered &", "(is_last & delivered &", RUNS),
     ("task/rules/pheromone.py", "ti.min(level + p.deposit_level, p.cap)", "p.cap", COLONY),
-    ("task/rules/pheromone.py", "ti.min(carried, p.fades_after)", "carried", CONFLICTS),
+    ("task/rules/pheromone.py", "ti.min(carried, p.fades_after)", "carried", ENGINE),
     ("task/rules/pheromone.py", "if after < 1.0:", "if after < 0.5:", COLONY),
     ("task/rules/pheromone.py", "levels[neighbour] * share", "level * share", COLONY),
     ("task/rules/policy.py", "larger(values[2], values[3])", "values[2]", RUNS),

@@ -145,29 +145,6 @@ def followers(seeds, schedule=None, world=None):
     return Colony(*given, **rules, schedule=schedule)
 
 
-@pytest.mark.slow
-def test_runs_with_a_protocol_do_not_depend_on_other_worlds_or_the_schedule():
-    every = followers(range(4)).run(2, 160, protocol=PROTOCOL)
-    assert followers(range(4), "by_chunk").run(2, 160, protocol=PROTOCOL) == every
-    for seed in (0, 3):
-        alone = followers([seed]).run(2, 160, protocol=PROTOCOL)
-        for name, array in vars(alone).items():
-            if isinstance(array, np.ndarray):
-                assert np.array_equal(array[:, 0], getattr(every, name)[:, seed]), name
-        given = (worlds.paper(), FORAGING, FOLLOWS, seed, 20)
-        plain = ReferenceColony(*given, sharing="frozen", q_values=trail_follower("ants"))
-        twin = Protocol(plain, PROTOCOL)
-        for _ in range(2):
-            twin.begin_episode()
-            for tick in range(160):
-                twin.before_tick()
-                plain.tick(last=tick == 159)
-            twin.end_episode()
-        for name in ("deliveries", "first_delivery", "moves", "blocked"):
-            counts = [getattr(one, name) for one in plain.records]
-            assert counts == getattr(alone, name)[:, 0].tolist()
-
-
 def test_a_run_leaves_no_trace_of_its_protocol():
     colony, other = followers(range(3)), followers(range(3))
     colony.run(1, 160, protocol=PROTOCOL)
