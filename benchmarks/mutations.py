@@ -25,7 +25,6 @@ TIMEOUT = 300.0  # seconds; a mutation that makes tests take longer counts as no
 RUNS = "tests/engines/runs/test_against_reference.py"
 BATCHED = "tests/engines/runs/test_batched.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
-NESTS = "tests/engines/colony/test_nests.py"
 RASTER = "tests/rendering/test_raster.py"
 CASTES = "tests/engines/colony/test_castes.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
@@ -104,13 +103,13 @@ MUTATIONS = [
         "FOODS[0 * snapshot.ant_foods]",
         RASTER,
     ),
-    ("engines/colony/state.py", "if n > 1}", "if per != NEST}", NESTS),
-    ("features/foods.py", "slots], state.kinds[w, slots]", "slots], 0", NESTS),
+    ("engines/colony/state.py", "if n > 1}", "if per != NEST}", COLONY),
+    ("features/foods.py", "slots], state.kinds[w, slots]", "slots], 0", COLONY),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
     ("task/rules/conflicts.py", "(other, tick) > key", "(other, tick) < key", COLONY),
-    ("engines/colony/steps.py", "(index != queen)", "(index < 0)", NESTS),
-    ("features/foods.py", "left = cell.loads - 1", "left = cell.loads - 2", NESTS),
+    ("engines/colony/steps.py", "(index != queen)", "(index < 0)", COLONY),
+    ("features/foods.py", "left = cell.loads - 1", "left = cell.loads - 2", COLONY),
     ("engines/colony/life.py", "put(c.nest, ant, nest)", "put(c.nest, ant, 0)", COLONY),
     ("features/foods.py", "cell.kind_of = ti.cast(a.kind, ti.u8)", "pass", COLONY),
     ("task/rules/conflicts.py", "loaded > other_loaded or", "loaded < other_loaded or", TRAFFIC),

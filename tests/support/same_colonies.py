@@ -58,9 +58,17 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
     assert ours.ground[places].tolist() == list(plain.world.ground.values())
+    ants = {ant.number: ant for ant in theirs}
+    in_order = [ants[number] for number in ours.ant_numbers.tolist()]
+    assert ours.ant_nests.tolist() == [ant.nest for ant in in_order]
+    kinds = [ant.own["kind"] if ant.carries else -1 for ant in in_order]
+    assert ours.ant_foods.tolist() == kinds
+    assert ours.queens.tolist() == [int(grid.index(cell)) for cell in plain.world.queens]
     food = np.flatnonzero(ours.ground == FOOD)
     at = world * grid.size + food
     their_foods = [tuple(cell) for cell in grid.cells(food).tolist()]
+    kinds = [plain.world.of_cells[cell]["kind_of"] for cell in their_foods]
+    assert ours.food_kinds[food].tolist() == kinds
     for feature, array in features.arrays(CELL):
         if feature.is_used(colony.task):
             held = [plain.world.of_cells[cell][array.name] for cell in their_foods]
