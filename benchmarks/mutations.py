@@ -55,7 +55,6 @@ ODD = "tests/report/test_odd.py"
 NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
 ON_GPU = "tests/engines/test_gpu.py"
-LONE_NOISE = "tests/envs/test_noise.py"
 DESIGN = "tests/studies/test_design.py"
 FEATURES = "tests/test_features.py"
 
@@ -72,7 +71,7 @@ MUTATIONS = [
         "engines/colony/learning.py",
         "does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0",
         "does = True",
-        CASTES,
+        COLONY,
     ),
     ("engines/colony/steps.py", ">> number & 1 == 1", ">> 0 & 1 == 1", COLONY),
     ("engines/colony/life.py", "ti.cast(bound <= word, ti.i32)", "0", COLONY),
@@ -196,7 +195,7 @@ MUTATIONS = [
     ("engines/runs/rollout_kernel.py", "base = own", "base = origin", ROLLOUT),
     ("engines/runs/step.py", "enters & ant.carries", "moves & ant.carries", BATCHED),
     ("task/rules/vision.py", "(state >> 1) & 21", "(state >> 1) & 5", BATCHED),
-    ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", LONE_NOISE),
+    ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", BATCHED),
     (
         "engines/runs/kernels.py",
         "a.trace[row, 5] = lanes.paper_state[k]",
