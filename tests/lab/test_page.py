@@ -10,7 +10,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from browser import Page, started
+from browser import Page
 
 from taichi_ants import lab, runtime
 
@@ -65,12 +65,6 @@ def test_the_modules_have_no_errors_of_types():
     config = ROOT / "lab" / "page" / "jsconfig.json"
     done = subprocess.run([compiler, "-p", config], capture_output=True, text=True)
     assert done.stdout == ""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with started() as one:
-        yield one
 
 
 class Lab(Page):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Page, started
+from browser import Page
 from rooms import CHOSEN, Guest, running
 
 from taichi_ants import Colony, load_policy
@@ -26,12 +26,6 @@ WORLD = """() => {
            loaded: frame.poses.reduce((sum, pose) => sum + (pose >> 3 & 1), 0),
            tick: frame.tick, deliveries: frame.deliveries };
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with started() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")
