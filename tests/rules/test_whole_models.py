@@ -25,82 +25,44 @@ TICKS = 50
 TRAIL = {"evaporation": "power_law", "half_life": None, "deposit": "weaker", "cap": None}
 TRAIL |= {"level": 250, "slope": None}
 ALARM = {"deposit": "alarm", "level": 250, "cap": None, "slope": None}
-# By name: arguments of `random_colony`; nests, kinds of food, loads; castes, labour, their cues;
-# and changes of the task.
+# By name: learner, sharing, traffic, dense, fields, and more arguments of `random_colony`; nests,
+# kinds of food, loads; castes, labour, their cues; and changes of the task.
 MODELS = {
     "softmax": (
-        {
-            **{"learner": "sarsa", "sharing": "shared", "traffic": "right_of_way"},
-            **{"dense": False, "fields": "ab", "cues": ("a", "b"), "choice": "softmax"},
-        },
-        (2, 2, True),
-        (2, True, None),
-        {},
-    ),
+        ("sarsa", "shared", "right_of_way", False, "ab", {"cues": ("a", "b"), "choice": "softmax"}),
+        (2, 2, True), (2, True, None), {}),
     "deneubourg": (
-        {
-            **{"learner": "q_learning", "sharing": "frozen", "traffic": "following"},
-            **{"dense": False, "fields": "aB", "choice": "deneubourg", "view": "strongest"},
-        },
-        (2, 1, False),
-        (2, True, [("trail", "compass"), ("a", "B")]),
-        {},
-    ),
+        ("q_learning", "frozen", "following", False, "aB",
+         {"choice": "deneubourg", "view": "strongest"}),
+        (2, 1, False), (2, True, [("trail", "compass"), ("a", "B")]), {}),
     "rules of users": (
-        {"learner": "q_learning", "sharing": "frozen", "traffic": "following", "dense": True},
-        (2, 2, False),
-        (2, True, None),
-        {"choice": "weber", "pheromone": TRAIL},
-    ),
+        ("q_learning", "frozen", "following", True, "", {}),
+        (2, 2, False), (2, True, None), {"choice": "weber", "pheromone": TRAIL}),
     "rewards of users": (
-        {
-            **{"learner": "sarsa", "sharing": "shared", "dense": False, "fields": "B"},
-            **{"traffic": "right_of_way"},
-        },
-        (3, 2, True),
-        (2, True, None),
-        {"choice": "restless", "reward": "shaped", "fields": {"B": {"evaporation": "power_law"}}},
-    ),
+        ("sarsa", "shared", "right_of_way", False, "B", {}), (3, 2, True), (2, True, None),
+        {"choice": "restless", "reward": "shaped", "fields": {"B": {"evaporation": "power_law"}}}),
     "labour of users": (
-        {
-            **{"learner": "sarsa", "sharing": "shared", "traffic": "following"},
-            **{"dense": False, "fields": "aB"},
-        },
-        (2, 2, False),
-        (2, True, None),
-        {"reward": "demanded", "pheromone": ALARM, "fields": {"a": ALARM, "B": ALARM}},
-    ),
+        ("sarsa", "shared", "following", False, "aB", {}), (2, 2, False), (2, True, None),
+        {"reward": "demanded", "pheromone": ALARM, "fields": {"a": ALARM, "B": ALARM}}),
     "choice by labour": (
-        {"learner": "q_learning", "sharing": "frozen", "dense": True, "fields": "aB"},
-        (2, 1, False),
-        (2, True, None),
-        {"choice": "hungry", "fields": {"a": {**ALARM, "deposited_when": "dead_end"}}},
-    ),
+        ("q_learning", "frozen", "blocking", True, "aB", {}), (2, 1, False), (2, True, None),
+        {"choice": "hungry", "fields": {"a": {**ALARM, "deposited_when": "dead_end"}}}),
     "own tables": (
-        {
-            **{"learner": "dyna_q", "sharing": "independent", "observation": "queues"},
-            **{"dense": True, "fields": "a", "cues": ("a", "compass"), "traffic": "following"},
-        },
-        (2, 3, True),
-        (2, True, None),
-        {},
-    ),
+        ("dyna_q", "independent", "following", True, "a",
+         {"observation": "queues", "cues": ("a", "compass")}),
+        (2, 3, True), (2, True, None), {}),
     "castes without labour": (
-        {
-            **{"learner": "expected_sarsa", "sharing": "shared", "observation": "trail_levels"},
-            **{"dense": True, "fields": "aB"},
-        },
-        (2, 2, False),
-        (3, False, [("B", "a"), ("trail", "compass")]),
-        {},
-    ),
-}
+        ("expected_sarsa", "shared", "blocking", True, "aB", {"observation": "trail_levels"}),
+        (2, 2, False), (3, False, [("B", "a"), ("trail", "compass")]), {}),
+}  # fmt: skip
+NAMES = ("learner", "sharing", "traffic", "dense", "fields")
 SLOW = ("labour of users",)
 
 
 def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[ProtocolEvent]] | None:
     """Return a drawn colony of a model and its protocol; None if its world has too few cells."""
-    arguments, (nests, kinds, loads), castes, changes = MODELS[name]
+    (*listed, more), (nests, kinds, loads), castes, changes = MODELS[name]
+    arguments = {**dict(zip(NAMES, listed, strict=True)), **more}
     drawn = random_colony(seed, 60, largest_range=8, noise=NOISE, changes=True, **arguments)
     if not drawn.task.food_changes or drawn.population["ants"] < 20:
         return None  # other kernels, or few steps
