@@ -306,7 +306,7 @@ def test_the_token_is_seen_in_no_command_line_and_no_address(browser, room, monk
 def test_files_are_saved_and_loaded(page, room, tmp_path):
     page.press("Shift+ArrowRight")
     wait(page, "viewer.history.frames.at(-1).tick === 10")
-    for kind in ("session", "page", "gif", "policy", "colony"):
+    for kind in ("session", "gif", "policy", "colony"):
         with page.tab.expect_download() as got:
             page.tab.click(f'[data-export="{kind}"]')
         got.value.save_as(tmp_path / got.value.suggested_filename)
@@ -379,6 +379,3 @@ def test_every_control_is_reached_by_keyboard_and_has_a_name(page):
         assert control in reached
     del reached["BODY"]
     assert [name for name, good in reached.items() if not good] == []
-
-
-# Elements beyond the sides of their card, and words that do not fit into their button or label.
