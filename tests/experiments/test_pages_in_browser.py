@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from browser import Page, printed, shares, started
+from browser import Page, printed, shares
 from finished_pages import colony_html, comparison_html, results
 from paper.claims import claims_rows
 
 pytestmark = pytest.mark.browser
 
 VERDICTS = ["supported", "equivalent", "undecided", "contradicted", "not tested"]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with started() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")
