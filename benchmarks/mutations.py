@@ -405,7 +405,7 @@ MUTATIONS = [
     ("settings.py", "if value == setting.default:", "if True:", FEATURES),
     # Designs.
     ("studies/design.py", "margin = 0.5 if axis.whole else 0.0", "margin = 0.0", DESIGN),
-    ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
+    ("studies/design.py", "low * (1 - share)", "low * share", DESIGN),
     ("studies/design.py", "from_last[-1] = True", "from_last[-1] = False", DESIGN),
     ("analysis/sensitivity.py", "default_rng(RANDOM_SEED)", "default_rng(0)", DESIGN),
     # Archives of studies, and descriptions of models.

@@ -2,7 +2,7 @@
 
 The task rewards only a pick-up (3) and a delivery (10). A network learns from one-hot observations.
 After training, it is converted to a table, evaluated and saved as a policy file. Then
-`python experiments/render.py episode --policy ppo.npz --out ppo.gif` draws an animation of the ant.
+`taichi-ants render episode --policy ppo.npz --out ppo.gif` draws an animation of the ant.
 
 Requires torch: `pip install -e ".[torch]"`. A seed takes about 30 seconds on one core. Prints the
 mean reward per step five times, then how many greedy rollouts deliver, and their mean return and

@@ -21,6 +21,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import sys
     from collections.abc import Mapping, Sequence
     from dataclasses import dataclass, replace
+    from functools import partial
     from itertools import product
     from pathlib import Path
     from typing import Any
@@ -38,7 +39,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.analysis.tables import plain_text, sentence
     from taichi_ants.errors import count
     from taichi_ants.learners.policies import save_policy
-    from taichi_ants.measures.finished import COLONY, Run, values_of
+    from taichi_ants.measures.finished import COLONY
     from taichi_ants.report import page
     from taichi_ants.settings import nested
     from taichi_ants.studies import command_line
@@ -48,6 +49,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.folder import Results as Runs
     from taichi_ants.studies.points import ColonyPoint, Drawn, settings_of
     from taichi_ants.studies.study import Study
+    from taichi_ants.studies.sweep import measured
     from taichi_ants.task import Life, Pheromone, Task, foraging, paper, queueing
     from taichi_ants.viewer import record_colony
     from taichi_ants.worlds import World
@@ -196,7 +198,8 @@ def plan(options: Mapping[str, Any]) -> Plan:
     conditions = conditions_of(*several, training, **{name: options[name] for name in names})
     seeds = tuple(range(options["seed"], options["seed"] + options["seeds"]))
     points = *conditions.values(), *map(greedy, conditions.values())
-    return Plan(Study(points, seeds, tuple(COLONY), measured), conditions)
+    measures = tuple(COLONY)
+    return Plan(Study(points, seeds, measures, partial(measured, "colony", measures)), conditions)
 
 
 def conditions_of(
@@ -242,16 +245,7 @@ def greedy(point: ColonyPoint) -> ColonyPoint:
     return replace(calm, pool=None, episodes=0, after=point) if point.episodes else calm
 
 
-# Measures.
-
-
-def measured(
-    points: Sequence[ColonyPoint], seeds: Sequence[int], outcome: Mapping[str, np.ndarray]
-) -> dict[str, np.ndarray]:
-    """Return the measures of the runs of one point, float64 (1, seeds)."""
-    (point,) = points
-    run = Run.of_colony({n: a[0] for n, a in outcome.items()}, point.ants, point.ticks)
-    return {name: array[None] for name, array in values_of(run).items()}
+# Results: measures, tables, policies, figures, and the page.
 
 
 def with_bounds(
@@ -276,9 +270,6 @@ def with_bounds(
         calm = values[greedy(point)]["deliveries"]
         found[condition] = {**of_point, "greedy": calm, "bound": bound, "bound_share": share}
     return found
-
-
-# Results: tables, policies, figures, and the page.
 
 
 def tables(plan: Plan, runs: Runs) -> str:

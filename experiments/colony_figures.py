@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import colony_findings as study
 
 from taichi_ants.analysis import style
+from taichi_ants.analysis.findings import means_in_words
 from taichi_ants.analysis.sweeps import draw_lines
 from taichi_ants.analysis.tables import sentence
 from taichi_ants.measures.finished import COLONY
@@ -106,13 +107,7 @@ def _lines(title: str, designs: Sequence[study.Trained], rows: Rows) -> Figure |
 
 
 def _spread(rows: Rows) -> str:
-    seeds = rows[0].seeds
-    means = (
-        f"Means over {study.seeds_in_words(seeds)}, with 95 % intervals"
-        if seeds > 1
-        else "One seed"
-    )
-    return f"{means}. Exploration rate {study.EVALUATION_EPSILON:g}."
+    return f"{means_in_words(rows[0].seeds)}. Exploration rate {study.EVALUATION_EPSILON:g}."
 
 
 def _each(rules: Iterable[str], *regimes: str) -> list[study.Trained]:

@@ -101,8 +101,7 @@ COMPARE = {
 }
 COLONY = {
     "seeds.csv": Table(
-        "condition and seed",
-        {**_CONDITION, "seed": "the seed", "MEASURE": "value of the measure"},
+        "condition and seed", {**_CONDITION, "seed": "the seed", "MEASURE": "value of the measure"}
     ),
     "conditions.csv": Table(
         "condition, over all seeds",

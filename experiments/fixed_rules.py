@@ -29,8 +29,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from colony_findings import RULES as AS_NAMED
 
     from taichi_ants import AntsError, Colony, Pheromone, Task, TrainingConfig, World, files, task
-    from taichi_ants.analysis.statistics import bootstrap_interval
-    from taichi_ants.analysis.tables import Table, interval
+    from taichi_ants.analysis.tables import Table
     from taichi_ants.learners.policies import FOLLOWED, RULES, trail_follower
     from taichi_ants.studies import command_line
     from taichi_ants.studies.command_line import whole_number
@@ -101,9 +100,8 @@ def print_table(settings: argparse.Namespace) -> None:
             rows.append([*words, *row(outcome, taught)])
             progress(len(rows) / len(choices))
     columns = COLUMNS + COMPARED if learned else COLUMNS
-    rows = [
-        [*cells, *[""] * (len(columns) - len(cells))] for cells in rows
-    ]  # no study has NetLogo's
+    # No study has NetLogo's trails.
+    rows = [[*cells, *[""] * (len(columns) - len(cells))] for cells in rows]
     print(*map(rule, FOLLOWED), sep="\n")
     made = Table("", columns, rows, text_columns=2)
     published.show(settings.publish or "", [made], bool(settings.publish))
@@ -137,7 +135,12 @@ def row(outcome: ColonyEpisodes, learned: Mapping[int, float]) -> list[str]:
     # An episode without any delivery counts with all its ticks.
     first = np.where(outcome.first_delivery < 0, TICKS, outcome.first_delivery).mean()
     blocked = 100 * outcome.blocked.sum() / outcome.moves.sum()
-    cells = [shown(deliveries), f"{deliveries.min():.0f}", f"{first:.0f}", f"{blocked:.0f} %"]
+    cells = [
+        published.mean(deliveries),
+        f"{deliveries.min():.0f}",
+        f"{first:.0f}",
+        f"{blocked:.0f} %",
+    ]
     if not learned:
         return cells
     missing = set(range(len(deliveries))) - learned.keys()
@@ -147,13 +150,7 @@ def row(outcome: ColonyEpisodes, learned: Mapping[int, float]) -> list[str]:
             "the study with more."
         )
     taught = np.array([learned[seed] for seed in range(len(deliveries))])
-    return [*cells, f"{taught.mean():.0f}", shown(taught - deliveries)]
-
-
-def shown(values: np.ndarray) -> str:
-    """Return a mean over seeds with its 95 % interval as text."""
-    (low,), (high,) = bootstrap_interval(values[None])
-    return f"{values.mean():.0f} {interval(low, high, 0)}"
+    return [*cells, f"{taught.mean():.0f}", published.mean(taught - deliveries)]
 
 
 def evaluate(

@@ -1,6 +1,6 @@
 """Draw all pictures of the README and the docs, and publish the tables of the studies.
 
-The scripts `render.py`, `learning.py` and `policy_sheet.py` draw the pictures in `renders/`. The
+`taichi-ants render`, `learning.py` and `policy_sheet.py` draw the pictures in `renders/`. The
 pictures in `docs/figures/`, and the tables of their pages, are those of `results/compare`,
 `results/colony` and `results/bridge`. If results are missing, the script runs the study first. The
 comparison takes less than a minute on two cores; see docs/results/foraging.md and
@@ -91,7 +91,9 @@ def make_gallery(settings: argparse.Namespace) -> None:
         draw, chosen = drawing([*arguments, "--out", str(path)])
         draw(chosen)
     with chromium() as browser:
-        if browser is not None:
+        if browser is None:
+            print(f"Skipped {VIEWER} and {LIVE}, which need Chromium and Playwright.")
+        else:
             make_viewer(settings.folder / "docs" / "figures", browser)
             make_live(settings.folder / "docs" / "figures", browser)
     if not settings.no_figures:
@@ -115,7 +117,6 @@ def chromium() -> Iterator[Any]:
     except ImportError:
         path = None
     if path is None:
-        print(f"Skipped {VIEWER} and {LIVE}, which need Chromium and Playwright.")
         yield None
         return
     with sync_playwright() as playwright:

@@ -13,16 +13,16 @@ from taichi_ants.studies.interruption import stoppable
 with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     import io
-    import shutil
     from collections.abc import Iterator
     from pathlib import Path
     from typing import Any
 
     import numpy as np
+    from gallery import chromium
     from PIL import Image
 
     from taichi_ants import files
-    from taichi_ants.errors import AntsError, imported
+    from taichi_ants.errors import AntsError
     from taichi_ants.studies.command_line import Parser, run_command
 
 ROOT = Path(__file__).parents[1]
@@ -123,12 +123,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def make_hero(settings: argparse.Namespace) -> None:
     """Choose the typical colony, and film it in both themes."""
-    playwright = imported("the film", "playwright.sync_api", "test")
-    path = shutil.which("chromium") or shutil.which("google-chrome")
-    if path is None:
-        raise AntsError("there is no browser to film; install chromium.")
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
+    with chromium() as browser:
+        if browser is None:
+            raise AntsError("there is no browser to film; install Chromium and Playwright.")
         tab = opened(browser, "dark")
         times = np.array([tab.evaluate("timesOf", seed) for seed in range(settings.seeds)])
         seed = most_typical(times)
@@ -142,7 +139,6 @@ def make_hero(settings: argparse.Namespace) -> None:
             first.save(content, "WEBP", **options, loop=0, quality=QUALITY, method=4)
             files.write_bytes(path, content.getvalue())
             print(f"{path}: {path.stat().st_size // 1000} kB")
-        browser.close()
 
 
 if __name__ == "__main__":

@@ -21,10 +21,11 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     import numpy as np
     import published
+    from published import mean
 
     from taichi_ants import Colony, TrainingConfig, evaluate, load_policy, offline, train, worlds
     from taichi_ants.analysis.statistics import bootstrap_interval
-    from taichi_ants.analysis.tables import Table, interval, number
+    from taichi_ants.analysis.tables import Table, number
     from taichi_ants.learners.policies import random_policy, trail_follower
     from taichi_ants.offline import Dataset, record, record_colony
     from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
@@ -74,12 +75,6 @@ def print_tables(settings: argparse.Namespace) -> None:
         published.show(f"offline_{title}", [table], settings.publish)
 
 
-def shown(values: np.ndarray, digits: int = 2) -> str:
-    """Return a mean over seeds with its interval as text."""
-    (low,), (high,) = bootstrap_interval(np.asarray(values, float)[None])
-    return f"{number(np.mean(values), digits)} {interval(low, high, digits)}"
-
-
 def learning(seeds: range, progress: Callable[[float], None]) -> Table:
     """Return table (a), the share of rollouts that deliver."""
     good = train(WORLD, ONLINE, seeds).q_values[0]
@@ -108,8 +103,8 @@ def learning(seeds: range, progress: Callable[[float], None]) -> Table:
             for learn in LEARNERS.values():
                 values = delivered(learn(some))
                 (low,), (high,) = bootstrap_interval((values - same)[None])
-                cells.append(shown(values) + (" -" if high < 0 else " +" if low > 0 else ""))
-            rows.append([name, f"{n}", *cells, shown(same)])
+                cells.append(mean(values, 2) + (" -" if high < 0 else " +" if low > 0 else ""))
+            rows.append([name, f"{n}", *cells, mean(same, 2)])
         progress((done + 1) / len(sources))
     notes = ("+ and -: more or less often than online Q-learning after as many transitions.",)
     columns = ("Behaviour", "transitions", *LEARNERS, "online Q-learning")
@@ -131,12 +126,11 @@ def judging(seeds: range, progress: Callable[[float], None]) -> Table:
             found: dict[str, list[tuple[float, ...]]] = {judge: [] for judge in JUDGES}
             for run in range(len(seeds)):
                 for judge, by in JUDGES.items():
-                    found[judge].append(
-                        _scores(by(data.of_run(run), policies, DISCOUNT, EPSILON), true)
-                    )
+                    values = by(data.of_run(run), policies, DISCOUNT, EPSILON)
+                    found[judge].append(_scores(values, true))
             for judge, scores in found.items():
                 ranks, loss, covered, size = np.array(scores).T
-                cells = shown(ranks), shown(loss), number(100 * covered.mean(), 0)
+                cells = mean(ranks, 2), mean(loss, 2), number(100 * covered.mean(), 0)
                 rows.append([name, judge, f"{episodes}", *cells, number(np.median(size))])
             progress(len(rows) / (9 * len(JUDGES)))
     columns = ("Behaviour", "method", "episodes", "rank correlation", "loss", "covered %", "sample")
@@ -178,12 +172,12 @@ def dying(seeds: range, progress: Callable[[float], None]) -> Table:
             some = data.first(transitions=n)
             tables = [learn(some) for learn in LEARNERS.values()]
             tables.append(LEARNERS["pessimistic"](mistaken.first(transitions=n)))
-            cells = [shown(_delivered(seeds, table), 0) for table in tables]
+            cells = [mean(_delivered(seeds, table)) for table in tables]
             lived = "for ever" if lifespan is None else f"{lifespan} ticks"
-            cells.append(shown([len(np.unique(some.of_run(run).state)) for run in seeds], 0))
+            cells.append(mean([len(np.unique(some.of_run(run).state)) for run in seeds]))
             rows.append([f"epsilon {epsilon:g}", lived, f"{n}", *cells])
         progress((done + 1) / len(cases))
-    own = shown(_delivered(seeds, FORAGING.q_values), 0)
+    own = mean(_delivered(seeds, FORAGING.q_values))
     notes = (f"The behaviour policy itself, without exploration, delivers {own}.",)
     columns = ("Behaviour", "ants live", "transitions", *LEARNERS, "death as an end", "states seen")
     title = "(c) Deliveries per 1000 ticks of 64 ants that do not die, by data of ants that do"

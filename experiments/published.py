@@ -19,7 +19,11 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from dataclasses import asdict
     from pathlib import Path
 
-    from taichi_ants.analysis.tables import Table, plain_text
+    import numpy as np
+    import numpy.typing as npt
+
+    from taichi_ants.analysis.statistics import bootstrap_interval
+    from taichi_ants.analysis.tables import Table, interval, number, plain_text
     from taichi_ants.errors import AntsError
     from taichi_ants.files import read_text, to_json, write_text
     from taichi_ants.studies.command_line import Parser, run_command
@@ -28,6 +32,13 @@ ROOT = Path(__file__).resolve().parents[1]
 FIGURES = ROOT / "docs" / "figures"
 _TABLE = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- /\2 -->)", re.DOTALL)
 _NUMBER = re.compile(r"(<!--n ([^>]+?)-->)[^<]*(<!--/n-->)")
+
+
+def mean(values: npt.ArrayLike, digits: int = 0) -> str:
+    """Return a mean over seeds with its 95 % interval as text."""
+    over = np.asarray(values, float)
+    (low,), (high,) = bootstrap_interval(over[None])
+    return f"{number(over.mean(), digits)} {interval(low, high, digits)}"
 
 
 def data_file(name: str) -> Path:
@@ -45,14 +56,6 @@ def write(path: Path, tables: Sequence[Table]) -> None:
     write_text(path, "[" + ",\n".join(parts) + "]\n")
 
 
-def publish(name: str, tables: Sequence[Table], figure: Path | None = None) -> None:
-    """Write the tables of a name and a figure to the docs, and fill the pages that show them."""
-    write(data_file(name), tables)
-    if figure is not None:
-        shutil.copyfile(figure, FIGURES / figure.name)
-    fill()
-
-
 def fill() -> None:
     """Write the published tables and numbers into all pages."""
     for page in pages():
@@ -60,10 +63,13 @@ def fill() -> None:
 
 
 def show(name: str, tables: Sequence[Table], publishes: bool, figure: Path | None = None) -> None:
-    """Print tables, and publish them if asked to."""
+    """Print tables; if asked to, write them and a figure to the docs, and fill the pages."""
     print(plain_text(tables, width=120))
     if publishes:
-        publish(name, tables, figure)
+        write(data_file(name), tables)
+        if figure is not None:
+            shutil.copyfile(figure, FIGURES / figure.name)
+        fill()
 
 
 def pages() -> list[Path]:

@@ -25,8 +25,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi.math import popcnt
 
     from taichi_ants import World, runtime, worlds
-    from taichi_ants.analysis.statistics import bootstrap_interval
-    from taichi_ants.analysis.tables import Table, interval
+    from taichi_ants.analysis.tables import Table
     from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word, low_word
     from taichi_ants.grid.constants import N_HEADINGS, STREAM_FORAGER
     from taichi_ants.grid.randomness import stream_state
@@ -295,7 +294,6 @@ def run(settings: argparse.Namespace, world: World, seed: int, room: int) -> For
 def row(outcomes: list[Foraging]) -> list[str]:
     """Return the row of a kind of world."""
     deliveries = 1000 * np.array([one.deliveries.mean() for one in outcomes])
-    (low,), (high,) = bootstrap_interval(deliveries[None])
     first = np.concatenate([one.first_delivery for one in outcomes])
     # A colony without any delivery counts with all its ticks.
     first = np.where(first == 0, outcomes[0].deliveries.shape[1], first).mean()
@@ -304,9 +302,8 @@ def row(outcomes: list[Foraging]) -> list[str]:
     ends = np.concatenate([one.lengths[:, -1:].ravel() / one.shortest for one in outcomes])
     has = ends > 0
     length = f"{ends[has].mean():.2f}" if has.any() else "-"
-    mean = f"{deliveries.mean():.0f} {interval(low, high, 0)}"
     share = f"{(found > 0).sum()}/{len(found)}"
-    return [mean, f"{first:.0f}", share, when, length, f"{has.sum()}"]
+    return [published.mean(deliveries), f"{first:.0f}", share, when, length, f"{has.sum()}"]
 
 
 if __name__ == "__main__":

@@ -31,10 +31,7 @@ ALONE = "a run of one ant", LONE, "leave it out, or use a Colony"
 
 
 def checked_world(
-    world: World,
-    learns: bool = False,
-    what: str = ALONE[0],
-    supports: Collection[str] = LONE,
+    world: World, learns: bool = False, what: str = ALONE[0], supports: Collection[str] = LONE
 ) -> World:
     """Return the world; AntsError unless `what` supports it and, with `learns`, it has food."""
     expect("world", world, World)

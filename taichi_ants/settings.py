@@ -118,11 +118,6 @@ class DeclaredSetting(NamedTuple):
         return issubclass(self.kind, Settings)
 
     @property
-    def has_names(self) -> bool:
-        """Whether the setting is a class of settings with named values."""
-        return self.is_group and bool(self.kind.named())  # type: ignore[attr-defined]
-
-    @property
     def allowed(self) -> str:
         """The allowed values, in the words of messages and tables."""
         if self.kind is str:

@@ -11,14 +11,10 @@ The table has, for each bridge, the share of colonies with most crossings on the
 the share of colonies with at least 80 % of them on one branch. See docs/models/double_bridge.md.
 """
 
-import sys
 from itertools import product
-from pathlib import Path
 
-import model_script
+import model_script  # whose import makes that of `bridge` possible
 import numpy as np
-
-sys.path.append(str(Path(__file__).parents[1]))
 from bridge import crossings
 
 from taichi_ants import Colony, Field

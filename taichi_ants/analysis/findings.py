@@ -13,11 +13,7 @@ from enum import Enum
 
 import numpy as np
 
-from taichi_ants.analysis.statistics import (
-    cautious_interval,
-    interquartile_mean,
-    without_noise,
-)
+from taichi_ants.analysis.statistics import cautious_interval, interquartile_mean, without_noise
 from taichi_ants.errors import count
 
 SIMULTANEOUS_LEVEL = 0.95

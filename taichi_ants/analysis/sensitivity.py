@@ -33,19 +33,17 @@ def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[dict
     draws = np.random.default_rng(RANDOM_SEED).integers(len(first), size=(len(first), 1000))
     rows = []
     for name, mixed in zip(names, between, strict=True):
-        found = np.array(_indices(first, mixed, last))
-        resampled = np.array(_indices(first[draws], mixed[draws], last[draws]))
-        half = _NORMAL_95 * resampled.std(axis=1, ddof=1)
+        found = _indices(first, mixed, last)
+        half = _NORMAL_95 * _indices(first[draws], mixed[draws], last[draws]).std(axis=1, ddof=1)
         ends = np.stack([found, found - half, found + half], axis=1).ravel().tolist()
         rows.append(dict(zip(COLUMNS, (measure, name, *ends), strict=True)))
     return rows
 
 
-def _indices(first: np.ndarray, mixed: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, ...]:
+def _indices(first: np.ndarray, mixed: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Return first-order and total index of the setting that `mixed` has from `last`."""
-    variance = np.var(np.concatenate([first, last]), axis=0)
-    alone = np.mean(last * (mixed - first), axis=0) / variance
-    return alone, 0.5 * np.mean((first - mixed) ** 2, axis=0) / variance
+    alone = np.mean(last * (mixed - first), axis=0), 0.5 * np.mean((first - mixed) ** 2, axis=0)
+    return np.array(alone) / np.var(np.concatenate([first, last]), axis=0)
 
 
 def report(rows: Sequence[Mapping[str, Any]], seeds: int) -> str:

@@ -91,12 +91,6 @@ class Table:
 Block = str | Table
 
 
-def markdown(blocks: Sequence[Block]) -> str:
-    """Return blocks as a Markdown document."""
-    texts = (item.markdown() if isinstance(item, Table) else f"{item}\n" for item in blocks)
-    return "\n".join(texts)
-
-
 def plain_text(blocks: Sequence[Block], width: int) -> str:
     """Return blocks as plain text of at most `width` columns, with empty lines between them."""
     from rich.console import Console

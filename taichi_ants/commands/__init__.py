@@ -1,4 +1,4 @@
-"""The commands, one file each; run them as `taichi-ants NAME` or by a script in `experiments/`."""
+"""The commands, one file each; run them as `taichi-ants NAME`."""
 
 from __future__ import annotations
 

@@ -1,17 +1,16 @@
 """Put a finished study into one file with everything that repeats it.
 
-FOLDER is a folder of finished results. The archive has the folder, with the runs and all files that
-the study has read, the versions of all packages, and a description of the model. See
-docs/how-to/clusters.md.
+The archive has the folder, with the runs and all files that the study has read, the versions of all
+packages, and a description of the model. See docs/how-to/clusters.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import zipfile
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError
@@ -30,7 +29,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = command_line.Parser(__doc__)
     add = parser.add_argument
-    add("folder", type=Path, metavar="FOLDER", help="folder of results")
+    add("folder", type=Path, metavar="FOLDER", help="folder of finished results")
     add("--out", type=Path, metavar="FILE", help="write the archive here (default: FOLDER.zip)")
     add("--force", action="store_true", help="replace an existing FILE")
     return parser.parse_args(arguments)
@@ -42,28 +41,25 @@ def run(settings: argparse.Namespace) -> None:
     manifest = finished(folder)
     if out.exists() and not settings.force:
         raise AntsError(f"{str(out)!r} exists; choose another --out, or give --force.")
-    texts = odd_of(folder, manifest), _requirements(manifest), _README.format(**manifest)
-    names = "ODD.md", "requirements.txt", "README.md"
-    contents = dict(zip(names, map(str.encode, texts), strict=True))
+    contents: dict[str, Any] = {"ODD.md": odd_of(folder, manifest)}
+    contents |= {"README.md": _README.format(**manifest), "requirements.txt": _pins(manifest)}
     for path in filter(Path.is_file, folder.rglob("[!.]*")):
         contents[f"{RESULTS}/{path.relative_to(folder).as_posix()}"] = path.read_bytes()
-
-    def save(file: BinaryIO) -> None:
-        with zipfile.ZipFile(file, "w") as archive:
-            for name, content in sorted(contents.items()):
-                entry = zipfile.ZipInfo(name)  # of 1980, because dates would change the bytes
-                entry.external_attr = 0o644 << 16
-                archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
-
-    files.write_atomically(out, save)
-    print(f"{out}: {len(contents)} files ({out.stat().st_size / 1e6:.1f} MB)")
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for name, content in sorted(contents.items()):
+            entry = zipfile.ZipInfo(name)  # of 1980, because dates would change the bytes
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
+    files.write_bytes(out, packed.getvalue())
+    print(f"{out}: {len(contents)} files ({packed.tell() / 1e6:.1f} MB)")
     print(f"To repeat the study and compare: taichi-ants reproduce {out}")
 
 
-def _requirements(manifest: Mapping[str, Any]) -> str:
+def _pins(manifest: dict[str, Any]) -> str:
     """Return the packages of a run with exact versions, in the format of pip's requirements."""
-    own, *others = (f"{name}=={version}\n" for name, version in manifest["packages"].items())
+    pins = [f"{name}=={version}" for name, version in manifest["packages"].items()]
     if commit := manifest["commit"]:
         changed = "" if manifest["clean"] else ", with changes that are not committed"
-        own = f"# Taichi Ants ran from its source, commit {commit}{changed}\n"
-    return "".join([f"# Python {manifest['python']}\n", own, *others])
+        pins[0] = f"# Taichi Ants ran from its source, commit {commit}{changed}"
+    return "\n".join([f"# Python {manifest['python']}", *pins, ""])

@@ -3,13 +3,12 @@
 The command loads a Python file. It compares each rule in kernels with its Python twin, for drawn
 inputs and in drawn colonies, and each observation in drawn colonies, bit by bit. Each learner
 learns for 2000 steps while Taichi checks indices. The command prints a line for each, and exits
-with status 1 if one has a fault. See docs/how-to/models.md and docs/how-to/models.md.
+with status 1 if one has a fault. See docs/how-to/models.md.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
 from itertools import chain
 
 from taichi_ants.studies import command_line
@@ -53,4 +52,4 @@ def run(settings: argparse.Namespace) -> None:
         print(f"{name}: 2000 steps: {fault or 'no fault'}", flush=True)
         has_fault |= bool(fault)
     if has_fault:
-        sys.exit(1)
+        raise SystemExit(1)

@@ -41,7 +41,6 @@ KINDS = {  # description and example of each subcommand
     "colony": ("render many ants with the same fixed policy", "--ants 200 --out ants.gif"),
 }
 
-
 STOPPED = "Stopped; nothing was left behind."
 
 

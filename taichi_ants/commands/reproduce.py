@@ -1,8 +1,7 @@
 """Repeat the study in an archive, and compare all of its tables and figures byte for byte.
 
-FILE is an archive that `taichi-ants archive` wrote. The command computes the study again in a new
-folder, and prints a line for each file. It exits with status 1 if a file differs. See
-docs/how-to/clusters.md.
+The command computes the study in a new folder, prints a line for each file, and exits with status 1
+if one differs. See docs/how-to/clusters.md.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ from __future__ import annotations
 import argparse
 import filecmp
 import platform
-import sys
 import tempfile
 import zipfile
 import zlib
@@ -31,11 +29,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = command_line.Parser(__doc__)
     add = parser.add_argument
-    add("file", type=Path, metavar="FILE", help="archive (.zip)")
-    about = "write the new results here (default: results/reproduced-NAME)"
-    add("--out", type=Path, metavar="FOLDER", help=about)
-    about = "run the Python code in the archive: plugins, and the module of the study"
-    add("--trust-code", action="store_true", help=about)
+    add("file", type=Path, metavar="FILE", help="archive that `taichi-ants archive` wrote")
+    add("--out", type=Path, metavar="FOLDER", help="new folder (default: results/reproduced-NAME)")
+    add("--trust-code", action="store_true", help="run plugins and other code in the archive")
     command_line.add_threads(parser)
     command_line.add_machines(parser)
     return parser.parse_args(arguments)
@@ -50,12 +46,11 @@ def run(settings: argparse.Namespace) -> None:
         unpack(settings.file, temporary)
         folder = Path(temporary, RESULTS)
         manifest = finished(folder)
-        files_of_code = sorted(folder.glob(f"{INPUTS}/*/**/*.py"))
-        code = ", ".join(f"results/{file.relative_to(folder)}" for file in files_of_code)
+        code = [str(path.relative_to(temporary)) for path in folder.glob(f"{INPUTS}/*/**/*.py")]
         if code and not settings.trust_code:
             raise AntsError(
-                f"the study runs code of the archive, {code}; read it, for example with "
-                "`unzip -p`, and give --trust-code to run it."
+                f"the study runs code of the archive, {', '.join(sorted(code))}; read it, for "
+                "example with `unzip -p`, and give --trust-code to run it."
             )
         here = {"python": platform.python_version(), **packages(manifest["packages"])}
         for name, there in {"python": manifest["python"], **manifest["packages"]}.items():
@@ -72,7 +67,7 @@ def run(settings: argparse.Namespace) -> None:
         print(f"{'equal      ' if name in equal else 'DIFFERENT  '}{name}")
     if number := len(names) - len(equal):
         print(f"{number} of {len(names)} files differ: the study is not reproduced.")
-        sys.exit(1)
+        raise SystemExit(1)
     print(f"All {len(names)} files are equal: the study is reproduced.")
 
 

@@ -2,7 +2,7 @@
 
 FILE lists fixed settings, the values or ranges of settings to vary, seeds, and measures. The
 command runs every combination of values, or the points of a design, with every seed, and writes
-tables and figures to a folder. See docs/how-to/sweeps.md and docs/how-to/sweeps.md.
+tables and figures to a folder. See docs/how-to/sweeps.md.
 """
 
 from __future__ import annotations

@@ -43,7 +43,6 @@ START: dict[str, Any] = {
     "settings": flat(replace(queueing(), life=Life(regrowth=0)).as_dict(), "task"),
 }
 
-
 # Steps of the first session before a page opens: twenty episodes, after which its ants deliver, and
 # the ticks in which they lay lanes between the queen and the food.
 LEARNED = 20 * (1000 + 1) + 300

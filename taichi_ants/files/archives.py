@@ -43,10 +43,7 @@ def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: b
 
 
 def read(
-    path: files.PathLike,
-    content: bytes | None = None,
-    most: int = MOST_BYTES,
-    sealed: bool = False,
+    path: files.PathLike, content: bytes | None = None, most: int = MOST_BYTES, sealed: bool = False
 ) -> Arrays:
     """Return all arrays of an .npz file, without executing anything in it.
 

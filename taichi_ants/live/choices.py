@@ -45,7 +45,6 @@ _LEARNING: dict[str, Any] = {
     **{"learning_rate_decay": 0.95, "min_learning_rate": 0.01, "initial_q": 10.0},
 }
 
-
 # The page has no castes, which some features require.
 _OF_CASTES = tuple(f"task.{feature.group}." for feature in FEATURES if "castes" in feature.example)
 

@@ -54,7 +54,6 @@ _QUIET = logging.getLogger("taichi_ants.live")  # keeps foreign requests out of 
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
 
-
 # Requests to refuse during a replay: they would be lost, or change the session if it is cancelled.
 _CHANGES = ("play", "step", "edit", "undo", "load", "back", "begin", "restart")
 
@@ -361,13 +360,9 @@ class SessionServer:
         """Send a complete frame to pages; with `begins`, also facts of the session."""
         messages: list[str | bytes] = [_message("snapshot"), self.session.recorder.whole()]
         if begins:
-            header, setup, choices = (
-                self.session.recorder.header(),
-                self.session.setup,
-                self.choices,
-            )
-            offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
-            begin = _message("begin", session=self._shown, header=header, **offered)
+            chosen = self.choices.chosen(self.session.setup)
+            facts = {"header": self.session.recorder.header(), "choices": self.choices.as_dict()}
+            begin = _message("begin", session=self._shown, chosen=chosen, **facts)
             messages = [begin, self._state(), *messages]
         for page in pages:
             page.begin(*messages)

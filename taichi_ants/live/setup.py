@@ -35,8 +35,6 @@ _MOST = {
     "ticks": 1_000_000_000,
 }
 
-
-SUPPORTS = COLONY
 FORM_SUPPORTS = BASE - OWN_RULES - CASTES - FOODS - FIELDS  # of the form of the page
 
 
@@ -63,7 +61,7 @@ class Setup:
 
     def __post_init__(self) -> None:
         expect("world", self.world, str)
-        checked_task(self.task, "the live page", SUPPORTS)
+        checked_task(self.task, "the live page", COLONY)
         for name, caste in self.task.castes.items():
             if caste.policy not in (None, *NAMED):  # pages must not name files
                 raise AntsError(

@@ -313,11 +313,7 @@ def described(model: Model, command: str) -> str:
     rows, heads = model.parameters(), ("Parameter", "Value", "Unit", "Meaning")
     sizes = ("ranges", "foods", "obstacles", "trails", "ants")
     worlds = [
-        (
-            *(str(world[size]) for size in sizes),
-            str(_nests(world)),
-            f"`{world['sha256'][:16]}`",
-        )
+        (*(str(world[size]) for size in sizes), str(_nests(world)), f"`{world['sha256'][:16]}`")
         for world in model.places[:_MOST]
     ]
     of_worlds = ("Ranges", "Food items", "Rock", "Trail cells", "Listed ants", "Nests", "SHA-256")

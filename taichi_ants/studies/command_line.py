@@ -178,8 +178,8 @@ def add_settings(parser: Parser, base: Settings) -> None:
             one_of = ", ".join(names) or "the parameters of the rule"
             about = f"{option}: {setting.rule.help}; SETTING is one of {one_of}. "
             group.description = f"{group.description or ''}{about}"
-        elif setting.path not in parser.own_settings and (
-            setting.has_names or not setting.is_group
+        elif setting.path not in parser.own_settings and not (
+            setting.is_group and not setting.kind.named()  # type: ignore[attr-defined]
         ):
             # The value is checked where it is used.
             how: dict[str, Any] = {"metavar": {int: "N", float: "X"}.get(setting.kind, "NAME")}

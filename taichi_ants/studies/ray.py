@@ -18,14 +18,11 @@ from taichi_ants.errors import AntsError, imported
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies.executors import RESUME, LostWorkersError
 
-_LOOK_EVERY, _PATIENCE, _RETRIES = 5.0, 3.0, 3  # seconds between looks, and for an answer
-_LEAST = 64  # workers for which there is work in advance
+_LOOK_EVERY, _PATIENCE = 5.0, 3.0  # seconds between looks, and for an answer
+_LEAST = 64  # workers for which there is work in advance, because machines can join later
 # Ray reads them when it starts: it sends no statistics, and prints fatal errors only.
-_ENVIRONMENT = {
-    "RAY_USAGE_STATS_ENABLED": "0",
-    "RAY_BACKEND_LOG_LEVEL": "fatal",
-    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
-}
+_ENVIRONMENT = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_BACKEND_LOG_LEVEL": "fatal"}
+_ENVIRONMENT |= {"RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
 
 
 class RayWorkers(Executor):
@@ -38,15 +35,14 @@ class RayWorkers(Executor):
     """
 
     def __init__(self, address: str | None = None, threads: int = 1, arch: str = "cpu") -> None:
-        for name, value in _ENVIRONMENT.items():
-            os.environ.setdefault(name, value)
         where: dict[str, Any] = {"num_cpus": available_threads(), "include_dashboard": False}
+        environment = dict(_ENVIRONMENT)
         if address:
             _check_listens(address)
+            where = {"runtime_env": {"py_modules": [str(Path(taichi_ants.__file__).parent)]}}
             if _has_token():  # `ray start` demands it then; clusters without tokens ignore it
-                os.environ.setdefault("RAY_AUTH_MODE", "token")
-            own = str(Path(taichi_ants.__file__).parent)
-            where = {"runtime_env": {"py_modules": [own]}}
+                environment["RAY_AUTH_MODE"] = "token"
+        os.environ.update(environment | os.environ)
         self._ray = imported("a cluster", "ray", "ray")
         with _quiet_start():
             try:
@@ -61,10 +57,9 @@ class RayWorkers(Executor):
                     "RAY_AUTH_TOKEN to the one that `ray get-auth-token` prints on the head."
                 ) from error
         self._head: str = self._ray.get_runtime_context().gcs_address
-        how = {"num_cpus": threads, "num_gpus": int(arch == "cuda"), "max_retries": _RETRIES}
-        self._remote = cache(self._ray.remote(**how))
-        room = int(self._ray.cluster_resources().get("CPU", 0) // threads)
-        self.num_workers = max(_LEAST, room)  # for machines that join later
+        self._remote = cache(self._ray.remote(num_cpus=threads, num_gpus=int(arch == "cuda")))
+        processors = self._ray.cluster_resources().get("CPU", 0)
+        self.num_workers = max(_LEAST, int(processors // threads))
         self._looked = time.monotonic()
 
     def submit(self, call: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
@@ -93,13 +88,13 @@ class RayWorkers(Executor):
         """
         if time.monotonic() - self._looked < _LOOK_EVERY:
             return
-        with suppress(AntsError):
+        try:
             _check_listens(self._head)
-            self._looked = time.monotonic()
-            return
-        raise LostWorkersError(
-            f"the head of the Ray cluster at {self._head!r} does not answer any more; {RESUME}."
-        )
+        except AntsError as error:
+            raise LostWorkersError(
+                f"the head of the Ray cluster at {self._head!r} does not answer any more; {RESUME}."
+            ) from error
+        self._looked = time.monotonic()
 
     def __exit__(self, *raised: object) -> None:
         self._ray.shutdown()
@@ -128,13 +123,12 @@ def _check_listens(address: str) -> None:
 def _quiet_start() -> Iterator[None]:
     """Discard what Ray's library in C++ prints at the start, and keep what SIGTERM does."""
     before, errors = signal.getsignal(signal.SIGTERM), os.dup(2)
-    nothing = os.open(os.devnull, os.O_WRONLY)
+    with open(os.devnull, "wb") as nothing:
+        os.dup2(nothing.fileno(), 2)
     try:
-        os.dup2(nothing, 2)
         yield
     finally:
         os.dup2(errors, 2)
         os.close(errors)
-        os.close(nothing)
         with suppress(ValueError):  # this is not the main thread
             signal.signal(signal.SIGTERM, before)

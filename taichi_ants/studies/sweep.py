@@ -20,8 +20,7 @@ from taichi_ants.measures import Run, finished
 from taichi_ants.measures.measure import RUN
 from taichi_ants.measures.series import stops
 from taichi_ants.settings import declared, flat
-from taichi_ants.studies import design
-from taichi_ants.studies.design import Axis, Design
+from taichi_ants.studies.design import Axis, Design, varying
 from taichi_ants.studies.folder import Results
 from taichi_ants.studies.points import SERIES
 from taichi_ants.studies.store import Arrays, parts_of
@@ -121,7 +120,7 @@ def sweep_of(file: Settings) -> Sweep:
         check_training(names, points[of_table])
     against: Any = flat(file["against"]) if isinstance(file.get("against"), dict) else {}
     (against,) = against.items() if len(against) == 1 else [None]
-    of_grid = drawn.is_grid and any(against in row.items() for row in rows)
+    of_grid = drawn.design == "grid" and any(against in row.items() for row in rows)
     if ("against" in file or "margin" in file) and not of_grid:
         said = "{} = {}".format(*against) if against else shown(file.get("against"))
         raise AntsError(
@@ -131,13 +130,13 @@ def sweep_of(file: Settings) -> Sweep:
     arrays = base.measures
     if "measure_every" in base.reading:
         arrays += tuple(f"{SERIES}{name}" for name in base.reading["measures"])
-    study = Study(points, base.seeds, arrays, partial(_measured, base.kind, base.measures))
+    study = Study(points, base.seeds, arrays, partial(measured, base.kind, base.measures))
     place = {point: n for n, point in enumerate(study.points)}
     order = [place[point] for point in points]
     return Sweep(base, study, order, rows, grids, drawn, against)
 
 
-def _measured(
+def measured(
     kind: str, wanted: Sequence[str], points: Sequence[Any], seeds: Sequence[int], outcome: Arrays
 ) -> Arrays:
     """Return the measures of a block, float64 (points, seeds)."""
@@ -192,7 +191,7 @@ def tables(sweep: Sweep, results: Results) -> str:
         more = ["finding", "difference", "low", "high", *["left_out"] * (first in gaps)]
         columns = [*sweeps.columns_of(sweep.settings), *more]
         files.write_csv(folder / "findings.csv", findings.values(), columns)
-    if not sweep.design.is_grid:  # nan comes last
+    if sweep.design.design != "grid":  # nan comes last
         order = np.argsort(-known_means(values[first]), kind="stable")[:_SHOWN_POINTS].tolist()
         title = f"The {len(order)} of {len(settings)} points with the highest {first}:\n\n"
     highest = {name: array[order] for name, array in values.items()}
@@ -201,7 +200,7 @@ def tables(sweep: Sweep, results: Results) -> str:
     report = f"{title}{report}"
     if sweep.design.sensitivity:
         ((_, axes),), seeds = sweep.grids, len(sweep.study.seeds)
-        names = list(design.varying(axes))
+        names = varying(axes)
         indices = [row for name in values for row in sensitivity.indices(name, names, values[name])]
         report = f"{report}\n{sensitivity.report(indices, seeds)}"
         files.write_csv(folder / "sensitivity.csv", indices, sensitivity.COLUMNS)
@@ -234,8 +233,8 @@ def _draw(sweep: Sweep, measure: str, values: np.ndarray, folder: Path) -> None:
     label = finished.of_runs(sweep.base.kind, measure).label
     for number, (grid, axes) in enumerate(sweep.grids, start=1):
         path = folder / f"{measure}{f'-{number}' * (len(sweep.grids) > 1)}.png"
-        if sweep.design.is_grid:
+        if sweep.design.design == "grid":
             sweeps.draw(path, sweep.settings[grid], values[grid], label)
         else:
-            names = list(design.varying(axes))
+            names = varying(axes)
             sweeps.draw_design(path, sweep.settings[grid], names, values[grid], label)

@@ -121,11 +121,7 @@ class Recorder:
             "types": self.types,
             # `seen_by` is its view, "" if an ant may know more or less than its letters say.
             "pheromones": [
-                {
-                    "name": name,
-                    "strongest": one.darkest,
-                    "seen_by": one.view if by_letters else "",
-                }
+                {"name": name, "strongest": one.darkest, "seen_by": one.view if by_letters else ""}
                 for name, one in zip(names, colony.pheromones, strict=False)
             ],
             "senses": {name: cue.words for name, cue in CUES.items()},  # what a better cell is

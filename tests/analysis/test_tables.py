@@ -8,7 +8,6 @@ from taichi_ants.analysis.tables import (
     Table,
     figure,
     interval,
-    markdown,
     number,
     percent,
     plain_text,
@@ -39,8 +38,8 @@ BEES = Table(
 
 
 def test_a_table_is_the_same_in_markdown_and_in_a_terminal() -> None:
-    assert markdown(["Insects.", BEES]) == (
-        "Insects.\n\n**Bees**\n\n| Who | How<br>many |\n| --- | ---: |\n"
+    assert BEES.markdown() == (
+        "**Bees**\n\n| Who | How<br>many |\n| --- | ---: |\n"
         "| a queen | 1<br>[1, 1] |\n\nCounted once.  \nBy hand.\n"
     )
     lines = plain_text(["Insects.", BEES], 40).splitlines()

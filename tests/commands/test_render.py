@@ -1,4 +1,4 @@
-"""The command line of `experiments/render.py`, from outside."""
+"""The command line of `taichi-ants render`, from outside."""
 
 from __future__ import annotations
 

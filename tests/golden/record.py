@@ -69,16 +69,16 @@ SHORT = {r"seeds = \d+": "seeds = 2", "episodes = 500": "episodes = 50"}
 SHORT |= {"episodes = 30": "episodes = 4", r"\bticks = \d+": "ticks = 90"}
 SHORT |= {r"measure_every = \d+": "measure_every = 30", r"\[0, 3000\]": "[0, 40]"}
 SWEEPS = ("learning_rates", "trails", "late_branch")
-COMPARE = "experiments/compare.py --quick --no-figures"
+COMPARE = f"{ROOT}/experiments/compare.py --quick --no-figures"
 COLONY = (
-    "experiments/colony.py study --seeds 2 --sizes 1 4 --no-figures --episodes 3 --ticks 90 "
-    "--rollouts 2 --world-kinds paper open piles moving"
+    f"{ROOT}/experiments/colony.py study --seeds 2 --sizes 1 4 --no-figures --episodes 3 "
+    "--ticks 90 --rollouts 2 --world-kinds paper open piles moving"
 )
 TABLES = ("runs.npz", "summary.csv", "table2.csv", "claims.csv", "behaviours.csv", "baselines.csv")
 STUDIES = {
     "compare": (COMPARE, TABLES),
     "colony": (COLONY, ("seeds.csv", "conditions.csv", "differences.csv")),
-    **{name: (f"experiments/sweep.py {name}.toml", ("runs.csv", "summary.csv")) for name in SWEEPS},
+    **{name: (f"-m taichi_ants sweep {name}.toml", ("runs.csv", "summary.csv")) for name in SWEEPS},
 }
 
 
@@ -193,7 +193,7 @@ def studies(names: Iterable[str]) -> Iterator[tuple[str, str]]:
             Path(folder, f"{name}.toml").write_text(text)
         for name in names:
             line, files = STUDIES[name]
-            command = [sys.executable, *f"{ROOT}/{line} --out {name}".split()]
+            command = [sys.executable, *f"{line} --out {name}".split()]
             path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
             environ = {**os.environ, "PYTHONPATH": path}
             ran = subprocess.run(command, cwd=folder, env=environ, capture_output=True, text=True)

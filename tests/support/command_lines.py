@@ -1,4 +1,4 @@
-"""Command lines of `experiments/`, run for tests in a new process or in this one."""
+"""Commands of the package and of `experiments/`, run for tests in a new process or in this one."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from taichi_ants.studies.columns import SWEEP
 TABLES = (SWEEP, columns.COMPARE, columns.COLONY, columns.BRIDGE)
 ROOT = Path(__file__).resolve().parents[2]
 EXPERIMENTS = ROOT / "experiments"
+STUDIES = ("compare", "colony", "bridge")  # scripts with studies, not commands of the package
 
 
 def crowding() -> float:
@@ -51,8 +52,10 @@ def environment(kernels: Path, **changes: str | None) -> dict[str, str]:
 
 
 def command(name: str, arguments: Sequence[object]) -> list[str]:
-    """Return the command line of an experiment."""
-    return [sys.executable, str(EXPERIMENTS / f"{name}.py"), *map(str, arguments)]
+    """Return the command line of a script or, if there is none, of a command of the package."""
+    script = EXPERIMENTS / f"{name}.py"
+    what = [str(script)] if script.exists() else ["-m", "taichi_ants", name]
+    return [sys.executable, *what, *map(str, arguments)]
 
 
 def run(
@@ -95,9 +98,6 @@ def descendants(pid: int) -> dict[int, str]:
     for _ in range(5):
         found |= {one: line for one, parent, line in rows if parent in found}
     return {one: line for one, line in found.items() if one != pid}
-
-
-STUDIES = ("compare", "colony", "bridge")  # scripts with studies, not starters of commands
 
 
 def load(name: str) -> ModuleType:
