@@ -44,7 +44,7 @@ class CColony(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_int32) for name in ("size", "n")),
         *((name, ctypes.c_void_p) for name in ("ground", "trail", "closer", "steps")),
-        *((name, ctypes.c_void_p) for name in ("cells", "headings", "random", "q")),
+        ("q", ctypes.c_void_p),
         *((name, ctypes.c_int32) for name in ("states", "evaporates")),
         *((name, ctypes.c_int32) for name in ("level", "slope", "fades_after")),
         ("discount", ctypes.c_float),
@@ -73,7 +73,8 @@ def load(command: str, folder: str | Path, threads: int) -> ctypes.CDLL:
         AntsError: The compiler fails, for example because it has no OpenMP.
     """
     loaded = compile_c(command, [SOURCE], Path(folder) / "colony.so", threads)
-    loaded.run.argtypes = ctypes.POINTER(CColony), ctypes.c_int, ctypes.c_int, ctypes.c_int
+    arrays, numbers = 3 * [ctypes.c_void_p], 3 * [ctypes.c_int]
+    loaded.run.argtypes = [ctypes.POINTER(CColony), *arrays, *numbers]
     loaded.run.restype = None
     return loaded
 
@@ -99,9 +100,6 @@ def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) ->
         "trail": arrays["trail"].copy(),
         "closer": arrays["closer"],
         "steps": arrays["compass"][:8].copy(),
-        "cells": arrays["cell"].copy(),
-        "headings": arrays["heading"].astype(np.uint8),
-        "random": arrays["streams"].copy(),
         "q": arrays["q"].copy(),
         "weights": arrays["weights"][np.minimum(np.arange(colony.ants + 1), last)],
         "rewards": np.array([*astuple(colony.task.rewards), 0], np.int32),
@@ -117,7 +115,9 @@ def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) ->
         **{name: array.ctypes.data for name, array in kept.items()},
     )
     rules = RULES[colony.task.observation]
-    library.run(ctypes.byref(in_c), rules, ticks, threads)
+    ants = arrays["cell"].copy(), arrays["heading"].astype(np.uint8), arrays["streams"].copy()
+    places = (array.ctypes.data for array in ants)
+    library.run(ctypes.byref(in_c), *places, rules, ticks, threads)
     return Lived(kept["q"].reshape(colony.task.n_states, -1)[:, :5], *in_c.counts)
 
 

@@ -57,7 +57,7 @@ def colony_works(ants: int, n_worlds: int) -> Iterator[tuple[str, Work]]:
 
         def work() -> int:
             several = ticks * threads
-            colony._launch_ticks(several, parts, threads)
+            colony._launch_parts("ticks", several, parts, threads)
             return several * steps
 
         return pace_of(work)

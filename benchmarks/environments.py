@@ -21,7 +21,7 @@ import numpy as np
 from measuring import machine, publish
 
 from taichi_ants import evaluate, runtime, worlds
-from taichi_ants.analysis.tables import Table, figure, interval, plain_text
+from taichi_ants.analysis.tables import Table, figure, interval, plain_text, thousands
 from taichi_ants.errors import count
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.studies.command_line import Parser, run_command, whole_number
@@ -74,7 +74,8 @@ def vector(num_envs: int) -> dict[str, Callable[[], int]]:
             env.rollout("random", length, epsilon=1.0)
         return rollouts * length * num_envs
 
-    return {f"{num_envs} {one.__name__}": one for one in (step, rollout, policy)}
+    calls = {"`step`": step, "`rollout`": rollout, "policy": policy}
+    return {f"{thousands(num_envs)} environments, {name}": call for name, call in calls.items()}
 
 
 class Nothing(gymnasium.Env):  # type: ignore[type-arg]

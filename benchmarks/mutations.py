@@ -25,8 +25,6 @@ TIMEOUT = 300.0  # seconds; a mutation that makes tests take longer counts as no
 RUNS = "tests/engines/runs/test_against_reference.py"
 BATCHED = "tests/engines/runs/test_batched.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
-CONFLICTS = "tests/engines/colony/test_conflicts.py"
-NESTS = "tests/engines/colony/test_nests.py"
 RASTER = "tests/rendering/test_raster.py"
 CASTES = "tests/engines/colony/test_castes.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
@@ -57,7 +55,6 @@ ODD = "tests/report/test_odd.py"
 NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
 ON_GPU = "tests/engines/test_gpu.py"
-LONE_NOISE = "tests/envs/test_noise.py"
 DESIGN = "tests/studies/test_design.py"
 FEATURES = "tests/test_features.py"
 
@@ -74,7 +71,7 @@ MUTATIONS = [
         "engines/colony/learning.py",
         "does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0",
         "does = True",
-        CASTES,
+        COLONY,
     ),
     ("engines/colony/steps.py", ">> number & 1 == 1", ">> 0 & 1 == 1", COLONY),
     ("engines/colony/life.py", "ti.cast(bound <= word, ti.i32)", "0", COLONY),
@@ -105,13 +102,13 @@ MUTATIONS = [
         "FOODS[0 * snapshot.ant_foods]",
         RASTER,
     ),
-    ("engines/colony/state.py", "if n > 1}", "if per != NEST}", NESTS),
-    ("features/foods.py", "slots], state.kinds[w, slots]", "slots], 0", NESTS),
+    ("engines/colony/state.py", "if n > 1}", "if per != NEST}", COLONY),
+    ("features/foods.py", "slots], state.kinds[w, slots]", "slots], 0", COLONY),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
-    ("task/rules/conflicts.py", "(other, tick) > key", "(other, tick) < key", CONFLICTS),
-    ("engines/colony/steps.py", "(index != queen)", "(index < 0)", NESTS),
-    ("features/foods.py", "left = cell.loads - 1", "left = cell.loads - 2", NESTS),
+    ("task/rules/conflicts.py", "(other, tick) > key", "(other, tick) < key", COLONY),
+    ("engines/colony/steps.py", "(index != queen)", "(index < 0)", COLONY),
+    ("features/foods.py", "left = cell.loads - 1", "left = cell.loads - 2", COLONY),
     ("engines/colony/life.py", "put(c.nest, ant, nest)", "put(c.nest, ant, 0)", COLONY),
     ("features/foods.py", "cell.kind_of = ti.cast(a.kind, ti.u8)", "pass", COLONY),
     ("task/rules/conflicts.py", "loaded > other_loaded or", "loaded < other_loaded or", TRAFFIC),
@@ -119,9 +116,9 @@ MUTATIONS = [
         "task/rules/conflicts.py",
         "rivals_left &= rivals_left - ti.u64(1)",
         "rivals_left = ti.u64(0)",
-        CONFLICTS,
+        COLONY,
     ),
-    ("task/rules/conflicts.py", "compass[N_HEADINGS - i]", "compass[i + 1]", CONFLICTS),
+    ("task/rules/conflicts.py", "compass[N_HEADINGS - i]", "compass[i + 1]", COLONY),
     ("engines/colony/steps.py", "enters &= actions.MOVES >> action", "enters &= 1", COLONY),
     ("engines/colony/steps.py", "goes = cell + enters * (wanted - cell)", "goes = wanted", COLONY),
     (
@@ -137,7 +134,7 @@ MUTATIONS = [
     ("task/rules/actions.py", "turns_at_queen == 1", "turns_at_queen == 0", RUNS),
     ("task/rules/actions.py", "(is_last | delivered &", "(is_last & delivered &", RUNS),
     ("task/rules/pheromone.py", "ti.min(level + p.deposit_level, p.cap)", "p.cap", COLONY),
-    ("task/rules/pheromone.py", "ti.min(carried, p.fades_after)", "carried", CONFLICTS),
+    ("task/rules/pheromone.py", "ti.min(carried, p.fades_after)", "carried", ENGINE),
     ("task/rules/pheromone.py", "if after < 1.0:", "if after < 0.5:", COLONY),
     ("task/rules/pheromone.py", "levels[neighbour] * share", "level * share", COLONY),
     ("task/rules/policy.py", "larger(values[2], values[3])", "values[2]", RUNS),
@@ -198,7 +195,7 @@ MUTATIONS = [
     ("engines/runs/rollout_kernel.py", "base = own", "base = origin", ROLLOUT),
     ("engines/runs/step.py", "enters & ant.carries", "moves & ant.carries", BATCHED),
     ("task/rules/vision.py", "(state >> 1) & 21", "(state >> 1) & 5", BATCHED),
-    ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", LONE_NOISE),
+    ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", BATCHED),
     (
         "engines/runs/kernels.py",
         "a.trace[row, 5] = lanes.paper_state[k]",

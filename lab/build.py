@@ -1,9 +1,9 @@
 """Build the pages of the lab, each a single file in docs: python lab/build.py.
 
-The modules of a page are joined in the order given into one script: lines that import are dropped,
-and the word "export" is; imported JSON becomes a constant. So each module can also be imported as
-it is, by Node and by a type checker. Fonts and WebAssembly are embedded in base64; the pages need
-no network.
+The modules of a page are joined into one script, each after those that it imports: lines that
+import are dropped, and the word "export" is; imported JSON becomes a constant. So each module can
+also be imported as it is, by Node and by a type checker. Fonts and WebAssembly are embedded in
+base64; the pages need no network.
 """
 
 from __future__ import annotations
@@ -15,59 +15,27 @@ import runpy
 import sys
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 from taichi_ants.live.server import PARTS
 from taichi_ants.viewer.page import assemble, part
 
-LAB = Path(__file__).parent
+LAB = Path(__file__).resolve().parent
 DOCS = LAB.parent / "docs"
 
 
-class Page(NamedTuple):
-    """A page: its markup, styles and modules. Each module uses only those before it at first."""
-
-    markup: str
-    styles: tuple[str, ...]
-    modules: tuple[str, ...]
-
-
-_ENGINE = ("worlds", "engine", "link")
-_SHARED = (*_ENGINE, "geometry", "looks", "run", "story", "shapes", "draw")
-_LAB = (
-    *("plot", "mind", "scenes", "daily", "brush", "controls", "figures", "train", "address"),
-    *("film", "embed", "main"),
-)
+_LESSONS = ["article/article.css", "lessons/lessons.css"]
+# Markup, styles after the common ones, and the module that imports all others.
 PAGES = {
-    "lab.html": Page(
-        "page/page.html",
-        ("page/base.css", "page/style.css"),
-        tuple(f"page/{name}.js" for name in (*_SHARED, *_LAB)),
-    ),
-    "article.html": Page(
-        "article/article.html",
-        ("page/base.css", "article/article.css"),
-        (
-            *(f"page/{name}.js" for name in (*_SHARED, "scenes")),
-            *(f"article/{name}.js" for name in ("pieces", "world", "article")),
-        ),
-    ),
-    "lessons.html": Page(
-        "lessons/lessons.html",
-        ("page/base.css", "article/article.css", "lessons/lessons.css"),
-        (
-            *(f"page/{name}.js" for name in (*_SHARED, "mind", "scenes", "figures")),
-            *(f"article/{name}.js" for name in ("pieces", "world")),
-            *("../docs/lessons/page/random.js", "../docs/lessons/page/room.js"),
-            *("../docs/lessons/page/experiments.js", "lessons/lessons.js"),
-        ),
-    ),
+    "lab.html": ("page/page.html", ["page/style.css"], "page/main.js"),
+    "article.html": ("article/article.html", ["article/article.css"], "article/article.js"),
+    "lessons.html": ("lessons/lessons.html", _LESSONS, "lessons/lessons.js"),
 }
-BINARIES = {"COLONY_WASM": "colony.wasm", "ANT_WASM": "ant.wasm"}
+BINARIES = ("colony.wasm", "ant.wasm")
 MOST_BYTES = 400_000  # that a visitor should wait for
 FONTS = LAB / "page" / "fonts"
 FACES = (("Newsreader", "500", "newsreader.woff2"), ("Inter", "400 650", "inter.woff2"))
 _IMPORT = re.compile(r"^import\b[^;]*;\n", re.M)
+_MODULE = re.compile(r'^import\b[^;]* from "([^"]+\.js)";$', re.M)
 _DATA = re.compile(r'^import (\w+) from "([^"]+)" with { type: "json" };$', re.M)
 # Names at the start of a line, also several in a row: const A = 1, B = 2;
 _NAMES = re.compile(r"^(?:async )?(?:const|let|function|class) ((?:\w+ = [^,(\[{\n]+, )*\w+)", re.M)
@@ -84,9 +52,16 @@ def with_data(path: Path) -> str:
     return _DATA.sub(data, path.read_text("utf-8"))
 
 
-def script(modules: tuple[str, ...]) -> str:
-    """Return the modules as one script; raise ValueError if two of them declare the same name."""
-    parts = [_IMPORT.sub("", with_data(LAB / name)) for name in modules]
+def modules_of(path: Path) -> list[Path]:
+    """Return a module after those that it imports, each once."""
+    names = _MODULE.findall(path.read_text("utf-8"))
+    imported = [one for name in names for one in modules_of((path.parent / name).resolve())]
+    return list(dict.fromkeys((*imported, path)))
+
+
+def script(name: str) -> str:
+    """Return a module with all that it imports; ValueError if two of them declare the same name."""
+    parts = [_IMPORT.sub("", with_data(path)) for path in modules_of(LAB / name)]
     text = re.sub(r"^export ", "", "\n".join(parts), flags=re.M)
     names = [re.sub(" = .*", "", one) for row in _NAMES.findall(text) for one in row.split(", ")]
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -97,19 +72,20 @@ def script(modules: tuple[str, ...]) -> str:
 
 def page(name: str) -> str:
     """Return a whole page; raise ValueError if it is larger than a visitor should wait for."""
-    one = PAGES[name]
+    markup, styles, module = PAGES[name]
     faces = "".join(
         f'@font-face {{ font-family: "{family}"; font-weight: {weight}; font-display: swap; '
         f'src: url(data:font/woff2;base64,{base64_of(FONTS / file)}) format("woff2"); }}\n'
         for family, weight, file in FACES
     )
-    code = script(one.modules)
-    found = {key: base64_of(LAB / "engine" / BINARIES[key]) for key in BINARIES if key in code}
-    head, body = (LAB / one.markup).read_text("utf-8").split("<body>\n")
+    code = script(module)
+    found = {one: base64_of(LAB / "engine" / one) for one in BINARIES if f'"{one}"' in code}
+    head, body = (LAB / markup).read_text("utf-8").split("<body>\n")
     parts = {
         "HEAD": head,
         "BODY": body,
-        "STYLE": faces + "\n".join((LAB / style).read_text("utf-8") for style in one.styles),
+        "STYLE": faces
+        + "\n".join((LAB / style).read_text("utf-8") for style in ("page/base.css", *styles)),
         "SCRIPT": f"const BINARIES = {json.dumps(found)};\n{code}",
     }
     if name == "lessons.html":
@@ -126,8 +102,10 @@ def page(name: str) -> str:
 def live_page() -> str:
     """Return the live page of the package with a worker in place of the server."""
     controls, style, _socket, *scripts = (part(name, "taichi_ants.live") for name in PARTS)
-    worker = script((*(f"page/{name}.js" for name in _ENGINE), "live/worker.js"))
-    texts = {"WORKER": f"{worker}\nserve();", "COLONY": base64_of(LAB / "engine" / "colony.wasm")}
+    texts = {
+        "WORKER": script("live/worker.js") + "\nserve();",
+        "COLONY": base64_of(LAB / "engine" / "colony.wasm"),
+    }
     lines = (f"const {name} = {json.dumps(text)};" for name, text in texts.items())
     scripts = [(LAB / "live" / "transport.js").read_text("utf-8"), *lines, *scripts]
     whole = assemble("Taichi Ants, live", controls=controls, style=style, script="\n".join(scripts))

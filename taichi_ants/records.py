@@ -42,7 +42,6 @@ class Record:
 
 
 def _none() -> np.ndarray:
-    """Return an array without ants."""
     return np.zeros(0, np.int32)
 
 

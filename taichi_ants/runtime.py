@@ -5,6 +5,7 @@ Importing the package does not start Taichi; the first call that needs a kernel 
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import ctypes
 import gc
@@ -12,6 +13,7 @@ import io
 import math
 import os
 import platform
+import sys
 import textwrap
 import threading
 import time
@@ -28,8 +30,7 @@ from taichi_ants.process_variables import fallback_folder, is_writable_folder
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
 _LONGEST_LOCK = 60.0  # seconds
-# The functions of the module textwrap that Taichi uses; they format lines once.
-_TEXTWRAP = SimpleNamespace(fill=cache(textwrap.fill), dedent=cache(textwrap.dedent))
+_trees: dict[str, Any] = {}  # syntax trees of functions in kernels, by source
 
 _Modes = ctypes.c_uint32 * 4  # C's `femode_t`; the second number is MXCSR
 _FLUSH_TO_ZERO = 1 << 15
@@ -121,16 +122,16 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     return wanted
 
 
+def stop() -> None:
+    """End Taichi if it runs; it then saves the kernels that it has compiled."""
+    if "taichi" in sys.modules:
+        sys.modules["taichi"].reset()
+
+
 def _exists(kinds: tuple[type, ...]) -> bool:
     # There are half a million objects, but only a few thousand types.
     types = {type(thing) for thing in gc.get_objects()}
     return any(issubclass(one, kinds) for one in types)
-
-
-def check_on_cpu(running: Runtime, what: str) -> None:
-    """Raise AntsError if Taichi runs on a GPU, for kernels whose threads wait for each other."""
-    if running.arch != "cpu":
-        raise AntsError(f"arch is {running.arch!r}, but {what} only on the CPU; use arch='cpu'.")
 
 
 def compiles_for_gpu() -> bool:
@@ -174,7 +175,7 @@ def quiet() -> Iterator[None]:
     It warns neither of numbers that kernels narrow on purpose, nor of long loops that are unrolled.
     The default types are f32 and i32, not the user's. Errors show their line without a mark of the
     place, because marks for all expressions take half of the time in which Taichi loads a cached
-    kernel. Taichi reads the source of a function at each call of it in a kernel; here, once.
+    kernel. Taichi reads and parses a function at each call of it in a kernel; here, once.
     """
     import taichi as ti
     from taichi._lib import core
@@ -185,8 +186,8 @@ def quiet() -> Iterator[None]:
     before = next((level for level in levels if core.logging_effective(level)), "critical")
     core.set_logging_level("error")
     marked, Context.get_pos_info = Context.get_pos_info, _line_of
-    reads = kernel_impl.getsourcelines, kernel_impl.textwrap
-    kernel_impl.getsourcelines, kernel_impl.textwrap = _source_lines, _TEXTWRAP
+    reads = {name: getattr(kernel_impl, name) for name in _READS}
+    vars(kernel_impl).update(_READS)
     running, config = ti.lang.impl.get_runtime(), ti.lang.impl.current_cfg()
     types = running.default_fp, running.default_ip  # those of `config` would be references
     try:
@@ -199,8 +200,15 @@ def quiet() -> Iterator[None]:
         for options in (running, config):
             options.default_fp, options.default_ip = types
         Context.get_pos_info = marked
-        kernel_impl.getsourcelines, kernel_impl.textwrap = reads
+        vars(kernel_impl).update(reads)
         core.set_logging_level(before)
+
+
+@cache
+def _source_file(function: Any) -> str:
+    from taichi.lang._wrap_inspect import getsourcefile
+
+    return getsourcefile(function)
 
 
 @cache
@@ -210,8 +218,35 @@ def _source_lines(function: Any) -> tuple[list[str], int]:
     return getsourcelines(function)
 
 
+def _parse(source: str) -> Any:
+    """Return the syntax tree of a function, one that no call uses."""
+    tree: Any = _trees.pop(source, None) or ast.parse(source)
+    tree.source = source
+    return tree
+
+
+def _transform(tree: Any, context: Any) -> Any:
+    from taichi.lang.ast import transform_tree
+
+    result = transform_tree(tree, context)
+    if not (context.is_kernel or context.is_real_function):  # Taichi changes their trees
+        _trees[tree.source] = tree
+    return result
+
+
+# Functions with which Taichi reads source, but once for each.
+_READS = {
+    "ast": SimpleNamespace(parse=_parse),
+    "getsourcefile": _source_file,
+    "getsourcelines": _source_lines,
+    "textwrap": SimpleNamespace(fill=cache(textwrap.fill), dedent=cache(textwrap.dedent)),
+    "transform_tree": _transform,
+}
+
+
 def _line_of(context: Any, node: Any) -> str:
     """Return the line of a node of a kernel, in Taichi's format."""
+    vars(node).pop("caller", None)  # from an earlier use of the tree
     number, function = context.lineno_offset + node.lineno, context.func.func.__name__
     return f'File "{context.file}", line {number}, in {function}:\n{context.src[node.lineno - 1]}\n'
 

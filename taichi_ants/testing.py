@@ -159,7 +159,6 @@ def _world(seed: int) -> World:
 
 
 def _colonies(task: Task, seed: int) -> tuple[Colony, ReferenceColony]:
-    """Return a drawn colony and its reference at the start of an episode."""
     world = _world(seed)
     learner = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 1.0) if task.needs_table else None
     sharing: Any = "frozen" if learner is None else "shared"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -88,6 +89,36 @@ def test_what_is_odd_is_named(name: str, colony: Colony) -> None:
     with pytest.raises(AntsError) as caught:
         ODD[name](colony)
     assert len(str(caught.value)) < 400
+
+
+BOUNDS, STRIPES = EpisodeBounds(WORLD, Task()), np.zeros((3, 128, 5))
+REFUSED = {
+    "behaviour_probability of the data contains nan": lambda: offline.importance_sampling(
+        replace(data(), behaviour_probability=np.full(len(data()), np.nan)), TABLE
+    ),
+    "q_values has shape": lambda: offline.model_based(data(), STRIPES[0, :3]),
+    "`discount` is 1": lambda: offline.model_based(data(), TABLE, 1.0),
+    "`resamples` is -1": lambda: offline.importance_sampling(data(), TABLE, resamples=-1),
+    "`discount` is 1.5": lambda: offline.fitted_q_iteration(data(), 1.5),
+    "data is 3": lambda: offline.batch_q_learning(3),
+    "behaviour has shape": lambda: record(WORLD, STRIPES, seeds=(1, 2)),
+    r"q_values has shape \(128, 4\)": lambda: record(WORLD, TABLE[:, :4]),
+    "episodes is 0": lambda: record(WORLD, episodes=0),
+    "epsilon is 2": lambda: record(WORLD, epsilon=2),
+    "discount.* -0.1": lambda: BOUNDS.optimal(-0.1, 600),
+    "discount.* 1.0": lambda: BOUNDS.optimal(1.0, 600),
+    "discount.* nan": lambda: BOUNDS.optimal(float("nan"), 600),
+    "constant trails": lambda: EpisodeBounds(WORLD, Task(evaporation_in_training=True)),
+    r"use a smaller world or fewer food items\.$": lambda: EpisodeBounds(
+        places.World((1000, 1000, 1), (0, 0, 0)), Task()
+    ),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_cannot_be_computed_is_refused(message: str) -> None:
+    with pytest.raises(AntsError, match=message):
+        REFUSED[message]()
 
 
 def test_results_and_policies_are_taken_for_their_tables() -> None:

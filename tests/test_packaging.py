@@ -7,7 +7,6 @@ import subprocess
 import sys
 import tarfile
 import zipfile
-from pathlib import Path
 
 import pytest
 from command_lines import ROOT, assert_one_sentence, environment
@@ -122,18 +121,3 @@ def test_an_unknown_command_is_one_sentence_and_the_version_is_printed(tmp_path)
         assert word in done.stderr
     done = call(["--version"], tmp_path)
     assert (done.returncode, done.stdout) == (0, "taichi-ants 0.1.0\n")
-
-
-def test_a_command_by_its_name(kernels, tmp_path):
-    """What it works with lies in the package: it runs in a folder of its own."""
-    Path(tmp_path, "tiny.toml").write_text(
-        'kind = "runs"\nseeds = 1\nepisodes = 60\nmeasures = ["return_last50"]\n'
-        'training = { learner = "sarsa", discount = 0.9, epsilon = 0.3, epsilon_decay = 0.9 }\n'
-        "vary.training.learning_rate = [0.1, 0.3]\n"
-    )
-    done = call(["sweep", "tiny.toml", "--no-figures"], tmp_path, kernels=kernels)
-    assert (done.returncode, done.stderr) == (0, "")
-    (folder,) = Path(tmp_path, "results").iterdir()
-    assert folder.name == "sweep-tiny"
-    assert (folder / "summary.csv").exists()
-    assert '"command": "' in (folder / "manifest.json").read_text()

@@ -2,18 +2,15 @@
 
 import { Painter } from "../page/draw.js";
 import { encode } from "../page/link.js";
+import { byId, bytesOf, icon } from "../page/page.js";
 import { Run, TICKS_A_SECOND } from "../page/run.js";
 import { many } from "../page/story.js";
 import { countOf, factOf, measured, PIECES, startOf } from "./pieces.js";
 
-// @ts-ignore: build.py declares it before all modules
-const COLONY = BINARIES.COLONY_WASM;
 const IN_VIEW = 0.3;       // of a world, from which it runs
 const MOST_TICKS_MS = 12;  // of a frame, for each world
 const FACT_MS = 100;       // between two numbers
 const SEEDS = 20;
-const ICONS = { play: "M8 5v14l11-7z", pause: "M7 5h4v14H7zM13 5h4v14h-4z", again: "M12 5V1L7 6l5 5V7a5 5 0 1 1-5 5H5a7 7 0 1 0 7-7z" };
-const icon = (name) => `<svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true"><path fill="currentColor" d="${ICONS[name]}"/></svg>`;
 const shown = (number) => (number < 20 && number % 1 ? number.toFixed(1) : many(number));
 
 class World {
@@ -156,13 +153,13 @@ class World {
 export class Stage {
   constructor() {
     const calm = matchMedia("(prefers-reduced-motion: reduce)");
-    this.module = new WebAssembly.Module(Uint8Array.from(atob(COLONY), (c) => c.charCodeAt(0)));
+    this.module = new WebAssembly.Module(bytesOf("colony.wasm"));
     this.theme = /theme=light/.test(location.search) ? "light" : "dark";
     this.ui = { arrows: "", still: calm.matches, now: 0, hero: -1, ghost: null, pointer: null };
     this.sleeping = true;
     this.worlds = [...document.querySelectorAll("[data-piece]")].map((figure) => new World(figure, this));
     this.last = null; // the world that came into view last
-    const toggle = document.getElementById("theme");
+    const toggle = byId("theme");
     toggle.addEventListener("click", () => this.setTheme(this.theme === "dark" ? "light" : "dark"));
     this.setTheme(this.theme);
     const sight = new IntersectionObserver((entries) => entries.forEach(({ target, intersectionRatio }) =>
@@ -179,7 +176,7 @@ export class Stage {
   setTheme(theme) {
     this.theme = theme;
     document.documentElement.dataset.theme = theme;
-    document.getElementById("theme").textContent = theme === "dark" ? "Light page" : "Dark page";
+    byId("theme").textContent = theme === "dark" ? "Light page" : "Dark page";
     for (const world of this.worlds) world.fit();
   }
 
@@ -198,15 +195,5 @@ export class Stage {
     for (const world of running) world.frame(Math.min(0.2, (now - before) / 1000), now);
     this.sleeping = !running.length;
     if (running.length) requestAnimationFrame((next) => this.frame(next, now));
-  }
-}
-
-/** Open a page of worlds under a name, or say why it cannot run. */
-export function openPage(name, Page) {
-  try {
-    window[name] = new Page();
-  } catch (error) {
-    document.querySelector(".lead").insertAdjacentHTML("afterend", "<p>This browser cannot run what is in this page: it needs WebAssembly with SIMD. The text can be read.</p>");
-    throw error;
   }
 }

@@ -6,11 +6,11 @@
  * Results are equal to the bit if the compiler does not fuse multiplications and additions
  * (-ffp-contract=off). With OpenMP, several threads share each tick.
  *
- * The ants are an array of small structs, sorted by cell from time to time. A cell has one byte for
- * its content and one for what its ant wants, so that a conflict reads all neighbours of a cell in
- * three loads. The largest value of each state and the actions that have it are stored, and change
- * only with the values of the state. A tick makes three or four passes over the ants, and one over
- * the pairs of state and action that had errors.
+ * The ants are an array of small structs, in any order. A cell has one byte for its content and one
+ * for what its ant wants, so that a conflict reads all neighbours of a cell in three loads. The
+ * largest value of each state and the actions that have it are stored, and change only with the
+ * values of the state. A tick makes three or four passes over the ants, and one over the pairs of
+ * state and action that had errors.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -21,7 +21,6 @@
 #include <omp.h>
 #else
 static int omp_get_thread_num(void) { return 0; }
-static int omp_get_num_threads(void) { return 1; }
 #endif
 #ifdef __AVX2__
 #include <immintrin.h>
@@ -52,7 +51,7 @@ enum { ENTER = 1, STANDS = 7, TAKE = 9, MARK = 15 };
 /* Flags in the same byte, which other ants read. */
 enum { HAS_FOOD = 16, TAKES_FOOD = 32, WINS = 64 };
 enum { ANT_SHIFT = 4 }; /* above the ground: 1 for an ant, 2 for a carrier */
-enum { TICKS_BETWEEN_SORTS = 8, FEWEST_TO_SORT = 2048, CELLS_TOGETHER = 64, MOST_THREADS = 64 };
+enum { MOST_THREADS = 64 };
 
 typedef struct {
     int32_t size, n;
@@ -60,9 +59,6 @@ typedef struct {
     int32_t *trail;        /* (size) the clock at which the trail has evaporated */
     const uint8_t *closer; /* (size) bit h: the neighbour at heading h is nearer to the queen */
     const int32_t *steps;  /* (8) to the neighbours at headings 5, 0, 1, 2, 3, 4, 5, 0 */
-    int32_t *cells;        /* (n) the cells of the ants */
-    uint8_t *headings;
-    uint64_t *random;
     float *q; /* (states, ROW) */
     int32_t states, evaporates;
     int32_t level, slope, fades_after;
@@ -101,8 +97,6 @@ typedef struct {
 
 typedef struct {
     Ant *ants;      /* (n) */
-    Ant *spare;     /* (n) room to sort the ants; NULL if they must keep their places */
-    int *places;
     uint8_t *wants; /* (size), with room for a row of cells before and after it */
     Greedy *greedy; /* (states) */
     Errors *errors[MOST_THREADS]; /* of each thread, (states * ROW) */
@@ -172,7 +166,7 @@ INLINE int level_of(const Colony *c, int cell, int clock)
     return level > 0 ? level : 0;
 }
 
-/* The percept of an ant, and if it sees ants the row of its table, which is the percept if not. */
+/* The percept of an ant, and the row of its table, which is the percept if it does not see ants. */
 INLINE int see(const Colony *c, int rules, int cell, int heading, int carries, int clock, int *row)
 {
     int codes[3], levels[3] = {0}, ants[3], nearer, strongest;
@@ -199,7 +193,7 @@ INLINE int see(const Colony *c, int rules, int cell, int heading, int carries, i
             codes[k] = shows ? SEES_CUE : codes[k] & 3;
         }
     }
-    int percept = carries << 6 | codes[0] << 4 | codes[1] << 2 | codes[2];
+    int percept = *row = carries << 6 | codes[0] << 4 | codes[1] << 2 | codes[2];
     if (rules & SEES_ANTS) {
         int index = carries, own = level_of(c, cell, clock);
         for (int k = 0; k < 3; k++) {
@@ -229,18 +223,13 @@ INLINE int after_deposit(const Colony *c, int rules, int cell, int clock, int ca
 /* Whether ants can enter cells with ants. */
 INLINE int shares_cells(int rules) { return (rules & (SWAPS | QUEUES)) != 0; }
 
-INLINE int state_of(int rules, const Ant *ant)
-{
-    return rules & SEES_ANTS ? ant->state : ant->percept;
-}
-
 INLINE void choose_and_want(const Colony *c, const Work *w, int rules, Ant *ant)
 {
     int percept = ant->percept, action = rules & SARSA ? ant->want - 1 : -1;
     uint64_t random = ant->random;
     if (action < 0) {
         random = advance(random);
-        unsigned greedy = w->greedy[state_of(rules, ant)].actions;
+        unsigned greedy = w->greedy[ant->state].actions;
         action = choose(greedy, bits_of(random), c->explore_below);
     }
     int cell = ant->cell, heading = turned(ant->heading, action);
@@ -451,8 +440,6 @@ INLINE int sense_and_learn(const Colony *c, const Work *w, int rules, Ant *ant, 
 {
     int event = ant->event, next = 0, cell = ant->cell, drawn = 0;
     int percept = see(c, rules, cell, ant->heading, ant->carries, clock, &next);
-    if (!(rules & SEES_ANTS))
-        next = percept;
     float next_value = w->greedy[next].best;
     if ((rules & SARSA) && event != DELIVERED) {
         ant->random = advance(ant->random);
@@ -461,7 +448,7 @@ INLINE int sense_and_learn(const Colony *c, const Work *w, int rules, Ant *ant, 
         drawn = 1 + action;
     }
     if (!(rules & FROZEN)) {
-        int pair = state_of(rules, ant) * ROW + ant->action;
+        int pair = ant->state * ROW + ant->action;
         float discount = event == DELIVERED ? 0.0f : c->discount;
         float error = (float)c->rewards[event] + discount * next_value - c->q[pair];
         pairs[n] = pair;
@@ -471,8 +458,7 @@ INLINE int sense_and_learn(const Colony *c, const Work *w, int rules, Ant *ant, 
         errors[pair].latest = error;
     }
     ant->percept = percept;
-    if (rules & SEES_ANTS)
-        ant->state = next;
+    ant->state = next;
     w->wants[cell - (ant->want ? c->steps[ant->want] : 0)] = 0; /* its previous cell */
     if (rules & SARSA)
         ant->want = drawn;
@@ -520,30 +506,6 @@ INLINE void apply(const Colony *c, const Work *w, int threads)
     }
 }
 
-/* Store the ants in the order of groups of cells, by a counting sort of all threads. */
-INLINE void sort(const Colony *c, const Work *w, int *places, Ant *spare)
-{
-    int groups = c->size / CELLS_TOGETHER + 1, thread = omp_get_thread_num();
-    int threads = omp_get_num_threads();
-    memset(places + thread * groups, 0, groups * sizeof *places);
-#pragma omp for schedule(static)
-    for (int i = 0; i < c->n; i++)
-        places[thread * groups + w->ants[i].cell / CELLS_TOGETHER]++;
-#pragma omp single
-    for (int group = 0, before = 0; group < groups; group++)
-        for (int t = 0; t < threads; t++) {
-            int here = places[t * groups + group];
-            places[t * groups + group] = before;
-            before += here;
-        }
-#pragma omp for schedule(static)
-    for (int i = 0; i < c->n; i++)
-        spare[places[thread * groups + w->ants[i].cell / CELLS_TOGETHER]++] = w->ants[i];
-#pragma omp for schedule(static)
-    for (int i = 0; i < c->n; i++)
-        w->ants[i] = spare[i];
-}
-
 INLINE void pass_as(Colony *colony, const Work *work, int rules, int tick, int ticks, int threads)
 {
 #pragma omp parallel num_threads(threads)
@@ -555,8 +517,6 @@ INLINE void pass_as(Colony *colony, const Work *work, int rules, int tick, int t
         int thread = omp_get_thread_num();
         for (int end = tick + ticks, now = tick; now < end; now++) {
             int clock = now * c->evaporates, n = 0;
-            if (w->spare && c->n >= FEWEST_TO_SORT && now % TICKS_BETWEEN_SORTS == 0)
-                sort(c, w, w->places, w->spare);
 #pragma omp for schedule(static)
             for (int i = 0; i < c->n; i++)
                 choose_and_want(c, w, rules, w->ants + i);
@@ -609,7 +569,7 @@ static void look_around(const Colony *c, const Work *w, int rules, int clock)
         Ant *ant = w->ants + i;
         int row = 0;
         ant->percept = see(c, rules, ant->cell, ant->heading, ant->carries, clock, &row);
-        ant->state = rules & SEES_ANTS ? row : ant->percept;
+        ant->state = row;
     }
 }
 

@@ -63,7 +63,7 @@ EXPORT void pass_acting(void)
     memcpy(frame.before, C.q, 4 * C.states * ROW);
     for (int i = 0; i < C.n; i++) {
         frame.ahead[i] = rules & SARSA && W.ants[i].want;
-        frame.rows[i] = state_of(rules, W.ants + i);
+        frame.rows[i] = W.ants[i].state;
     }
     pass(1);
 }
@@ -152,7 +152,7 @@ EXPORT int pack_frame(int whole, int acted, double epsilon, double learning_rate
     end_section(&section, 1); /* groups */
     end_section(&section, 1); /* marks */
     for (int i = 0; i < n; i++) {
-        int state = state_of(rules, W.ants + i);
+        int state = W.ants[i].state;
         frame.known[state] += !frame.known[state];
         WRITE(uint16_t, state);
     }

@@ -14,10 +14,9 @@ enum { TICKS_TO_FADE = 20, FARTHEST = 2048 };
 static Colony C;
 static Work W;
 static Grid G;
-static int rules, most, tick, queen, next_number, n_start_cells, n_aside;
+static int rules, most, tick, queen, next_number, n_start_cells;
 static uint64_t seed, interventions;
 static char *memory;
-static int16_t aside[3 * REACH * (REACH + 1)][2]; /* steps (q, r) by distance, then (x, y, z) */
 
 /* What the page reads and writes. */
 static struct {
@@ -25,7 +24,7 @@ static struct {
     int32_t *cells, *before, *before2, *brush;
     uint16_t *states;
     float *traffic;
-    int32_t mind[16];
+    int32_t mind[4];
 } page;
 
 /* A frame of frames.c, what the frames before it have sent, and what one with actions needs. */
@@ -172,17 +171,6 @@ static void order_start_cells(void)
         }
 }
 
-static void list_aside(void)
-{
-    n_aside = 0;
-    for (int far = 1; far <= REACH; far++)
-        for (int x = 0; x <= far; x++)
-            for (int y = 0; y <= far; y++)
-                for (int z = 0; z <= far; z++)
-                    if (smallest(x, y, z) == 0 && largest(x, y, z) == far)
-                        aside[n_aside][0] = x - z, aside[n_aside++][1] = y - z;
-}
-
 /* Write what a frame shows of the cells. */
 EXPORT void pack_cells(void)
 {
@@ -200,7 +188,7 @@ static void pack_ants(void)
         const Ant *ant = W.ants + i;
         page.headings[i] = ant->heading;
         page.looks[i] = ant->carries | ant->event << 1 | ant->action << 4;
-        page.states[i] = state_of(rules, ant);
+        page.states[i] = ant->state;
     }
 }
 
@@ -231,7 +219,6 @@ EXPORT void begin(uint32_t low, uint32_t high, int n, float first)
         C.q[i] = first;
     note_best(&C, &W);
     order_start_cells();
-    list_aside();
     for (int k = 0; k < n_start_cells && C.n < n; k++)
         if (C.ground[start_cells[k]] == EMPTY)
             add_ant(start_cells[k],
@@ -260,20 +247,30 @@ EXPORT __attribute__((noinline)) void pass(int ticks)
 
 /* ---- Interventions ------------------------------------------------------------------------- */
 
-/* Move ants from painted cells to others: each by the first step that none has taken before it. */
+/* Move ants by this step from painted cells to others that are empty. */
+static void move_by(int steps_q, int steps_r)
+{
+    for (int i = 0; i < C.n; i++) {
+        int cell = W.ants[i].cell, q = cell % G.width + steps_q, r = cell / G.width + steps_r;
+        int to = r * G.width + q;
+        if (!painted[cell] || q < 0 || q >= G.width || r < 0 || r >= G.height)
+            continue;
+        if (painted[to] || C.ground[to] != EMPTY || !exists(&G, to))
+            continue;
+        C.ground[to] = C.ground[cell], C.ground[cell] = EMPTY;
+        W.ants[i].cell = page.cells[i] = to;
+    }
+}
+
+/* Move ants from painted cells: steps are tried in the order of distance, then of (x, y, z). */
 static void move_aside(void)
 {
-    for (int k = 0; k < n_aside; k++)
-        for (int i = 0; i < C.n; i++) {
-            int cell = W.ants[i].cell, q = cell % G.width + aside[k][0];
-            int r = cell / G.width + aside[k][1], to = r * G.width + q;
-            if (!painted[cell] || q < 0 || q >= G.width || r < 0 || r >= G.height)
-                continue;
-            if (painted[to] || C.ground[to] != EMPTY || !exists(&G, to))
-                continue;
-            C.ground[to] = C.ground[cell], C.ground[cell] = EMPTY;
-            W.ants[i].cell = page.cells[i] = to;
-        }
+    for (int far = 1; far <= REACH; far++)
+        for (int x = 0; x <= far; x++)
+            for (int y = 0; y <= far; y++)
+                for (int z = 0; z <= far; z++)
+                    if (smallest(x, y, z) == 0 && largest(x, y, z) == far)
+                        move_by(x - z, y - z);
 }
 
 /* Make the n cells in `brush`, each once, EMPTY, OBSTACLE or FOOD. Ants move aside. */
@@ -348,19 +345,11 @@ EXPORT int ants(void) { return C.n; }
 EXPORT int states(void) { return C.states; }
 EXPORT double count(int k) { return (double)C.counts[k]; }
 
-/* Write into `mind` what an ant with this place and load would see: its state, the bits of the
- * best actions, three codes, three levels, the own level. */
+/* Write into `mind` the state of an ant with this place and load, and the bits of its best actions. */
 EXPORT void see_from(int cell, int heading, int carries)
 {
-    int row = 0, base = rules & QUEUES ? 7 : rules & SEES_ANTS ? 6 : 4;
-    int percept = see(&C, rules, cell, heading, carries, tick, &row);
-    row = rules & SEES_ANTS ? row : percept;
-    page.mind[0] = row, page.mind[1] = (int)W.greedy[row].actions;
-    for (int k = 2; k >= 0; k--, row /= base) {
-        page.mind[2 + k] = row % base;
-        page.mind[5 + k] = level_of(&C, cell + C.steps[heading + k], tick);
-    }
-    page.mind[8] = level_of(&C, cell, tick);
+    see(&C, rules, cell, heading, carries, tick, &page.mind[0]);
+    page.mind[1] = (int)W.greedy[page.mind[0]].actions;
 }
 
 /* Also write what an ant will do next, and whether it explores. */
@@ -371,8 +360,8 @@ EXPORT void read_mind(int i)
     int drawn = rules & SARSA ? ant->want : 0;
     uint64_t bits = bits_of(drawn ? ant->random : advance(ant->random));
     int action = choose(W.greedy[page.mind[0]].actions, bits, C.explore_below);
-    page.mind[9] = drawn ? drawn - 1 : action;
-    page.mind[10] = bits >> 32 < C.explore_below;
+    page.mind[2] = drawn ? drawn - 1 : action;
+    page.mind[3] = bits >> 32 < C.explore_below;
 }
 
 static uint64_t hash;

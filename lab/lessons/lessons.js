@@ -2,15 +2,15 @@
  * opened. With ?teachers in the address, all answers are open, and notes for teachers are shown. */
 
 import { EXPERIMENTS, ACTS, nameOf, SETTINGS, viewOf, written } from "../../docs/lessons/page/experiments.js";
-import { openPage, Stage } from "../article/world.js";
-import { LoneAnts, STEPS } from "../page/engine.js";
+import { Stage } from "../article/world.js";
+import { LoneAnts } from "../page/engine.js";
 import { escaped, plotOf, tableOf } from "../page/figures.js";
 import { centre } from "../page/geometry.js";
 import { LOOKS } from "../page/looks.js";
 import { glyph } from "../page/mind.js";
+import { byId, bytesOf, openPage } from "../page/page.js";
+import { STEPS } from "../page/worlds.js";
 
-// @ts-ignore: build.py declares it before all modules
-const ANT = BINARIES.ANT_WASM;
 const RANGE = 10, FIRST_CELL = [-8, 0];       // of the paper's world: its size, and where ants start
 /** The recorded steps of lone ants: a map, a slider, and what happened in a step. */
 class Walk {
@@ -159,7 +159,7 @@ class Group {
 class Lessons extends Stage {
   constructor() {
     super();
-    this.lone = new LoneAnts(new WebAssembly.Module(Uint8Array.from(atob(ANT), (c) => c.charCodeAt(0))));
+    this.lone = new LoneAnts(new WebAssembly.Module(bytesOf("ant.wasm")));
     this.teachers = /\bteachers\b/.test(location.search);
     this.chapters = [...document.querySelectorAll("article")];
     this.places = [...document.querySelectorAll(".piece")].map((element) => new Place(element, this));
@@ -198,9 +198,9 @@ class Lessons extends Stage {
   turn() {
     const number = location.hash.slice(1);
     for (const chapter of this.chapters) chapter.hidden = chapter.id !== number;
-    document.getElementById("contents").hidden = this.chapters.some(({ hidden }) => !hidden);
+    byId("contents").hidden = this.chapters.some(({ hidden }) => !hidden);
     for (const link of document.querySelectorAll("nav a")) link.toggleAttribute("aria-current", link.getAttribute("href") === location.hash);
-    const other = /** @type {HTMLAnchorElement} */ (document.getElementById("edition"));
+    const other = byId("edition");
     [other.href, other.textContent] = this.teachers ? [`?${location.hash}`, "Students’ edition"] : [`?teachers${location.hash}`, "Teachers’ edition"];
     scrollTo(0, 0);
   }

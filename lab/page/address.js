@@ -1,7 +1,7 @@
 /* address.js: the address holds the scene, the seed and every stroke, so that a link replays a visit to the bit. */
 
-import { byId } from "./controls.js";
 import { decode, encode, linkOf, partsOf, pythonOf } from "./link.js";
+import { byId } from "./page.js";
 import { QUESTIONS } from "./scenes.js";
 import { many } from "./story.js";
 

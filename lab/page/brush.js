@@ -1,7 +1,7 @@
 /* brush.js: drawing into the world, by pointer, touch or keyboard; and picking an ant with the eye. */
 
-import { STEPS } from "./engine.js";
-import { cellAt, centre } from "./geometry.js";
+import { cellAt, centre, lineTo } from "./geometry.js";
+import { STEPS } from "./worlds.js";
 
 const KEYS = { ArrowUp: 0, ArrowDown: 3 };
 const SIDEWAYS = { ArrowRight: [1, 2], ArrowLeft: [4, 5] }; // in turn, so that the brush keeps its row
@@ -16,7 +16,7 @@ export class Brush {
   constructor(lab, side) {
     this.lab = lab;
     this.side = side;
-    this.end = -1;   // the last cell of the stroke
+    this.end = null; // the last cell of the stroke
     this.fresh = []; // cells that are not applied yet
     this.even = false;
     const on = (name, act) => side.canvas.addEventListener(name, act);
@@ -50,7 +50,7 @@ export class Brush {
   lower() {
     if (!this.lab.mayDraw()) return;
     this.lab.ui.down = true;
-    this.end = -1;
+    this.end = null;
     this.drawTo(this.lab.ui.pointer);
     this.flush();
   }
@@ -62,11 +62,10 @@ export class Brush {
   }
 
   /** Extend the stroke to a cell, along a straight line, as far as the world goes. */
-  drawTo([q, r]) {
+  drawTo(cell) {
     const { engine } = this.side.run;
-    if (!engine.exists(q, r)) return;
-    const cell = engine.at(q, r);
-    this.fresh.push(...(this.end < 0 ? [cell] : engine.line(this.end, cell).slice(1)));
+    if (!engine.exists(...cell)) return;
+    for (const one of this.end ? lineTo(this.end, cell) : [cell]) this.fresh.push(engine.at(...one));
     this.end = cell;
   }
 

@@ -1,23 +1,9 @@
 /* controls.js: the settings, speeds and brushes beside the world. */
 
 import { LEARNERS, PARTS, RULES } from "./engine.js";
+import { byId, icon } from "./page.js";
 import { many, seconds } from "./story.js";
 import { WORLDS } from "./worlds.js";
-
-/** @returns {any} an element, or null */
-export const byId = (id) => document.getElementById(id);
-
-const ICONS = {
-  play: '<path d="M5 3.2v11.6L15 9z"/>',
-  pause: '<path d="M4.5 3h3.2v12H4.5zM10.3 3h3.2v12h-3.2z"/>',
-  rock: '<path d="M3 13.5 4.6 7l4-3.6 4.6 2 2.3 5-1.6 3.1z"/>',
-  food: '<circle cx="6" cy="11.3" r="3.2"/><circle cx="12.3" cy="11.3" r="3.2"/><circle cx="9.1" cy="5.8" r="3.2"/>',
-  scent: '<path class="line" d="M2 12.5c2.2-3 4.4-3 6.6-.7s4.6 1.6 7.4-2.3M2 7.5c2.2-3 4.4-3 6.6-.7s4.6 1.6 7.4-2.3"/>',
-  erase: '<path class="line" d="M7.2 14.8 2.6 10.2a1.3 1.3 0 0 1 0-1.8l5.6-5.600a1.3 1.3 0 0 1 1.8 0l4.7 4.700a1.3 1.3 0 0 1 0 1.800l-5.5 5.500zm1.5 0h6.5"/>',
-  look: '<path class="line" d="M1.5 9S4.2 4 9 4s7.5 5 7.5 5-2.7 5-7.5 5S1.5 9 1.5 9z"/><circle cx="9" cy="9" r="2.4"/>',
-  undo: '<path class="line" d="M6.5 3.5 3 7l3.5 3.500M3.5 7h7a4 4 0 0 1 0 8H7"/>',
-};
-export const icon = (name) => `<svg viewBox="0 0 18 18" fill="currentColor" aria-hidden="true">${ICONS[name]}</svg>`;
 
 const SPEEDS = [0.5, 1, 4, 16];
 const BRUSHES = [["rock", "Rock", "Draw rock (R)"], ["food", "Food", "Draw food (F)"], ["scent", "Trail", "Draw a trail (T)"],
@@ -54,8 +40,7 @@ const SIZES = ["small", "medium", "large", "huge"];
 /** The index of the step that is nearest to a value. */
 const stepOf = (steps, value) => steps.reduce((best, step, k) => (Math.abs(step - value) < Math.abs(steps[best] - value) ? k : best), 0);
 
-const switched = (id, label, help) => `<div class="control" title="${help}"><div class="name"><span id="l-${id}">${label}</span>`
-  + `<button class="switch" id="${id}" role="switch" aria-labelledby="l-${id}" aria-checked="false"></button></div></div>`;
+const switched = (id, label, help) => `<div class="control" title="${help}"><label><span>${label}</span><input type="checkbox" role="switch" class="switch" id="${id}"></label></div>`;
 const selected = (id, label, options, help = "") => `<div class="control" title="${help}"><label><span>${label}</span><select id="${id}">`
   + `${options.map(([value, words]) => `<option value="${value}">${words}</option>`).join("")}</select></label>`;
 const slider = ({ name, label, steps, help = "" }) => `<div class="control" title="${help}"><label for="c-${name}"><span>${label}</span><output id="o-${name}"></output></label>`
@@ -93,7 +78,7 @@ export class Controls {
       if (title) this.lab.toast(title, 5000);
     });
     const on = (id, act) => byId(id).addEventListener("change", ({ target }) => act(target));
-    byId("learns").addEventListener("click", () => this.lab.set("learns", this.scene.learns ? 0 : 1));
+    on("learns", ({ checked }) => this.lab.set("learns", Number(checked)));
     on("rules", ({ value }) => this.lab.restart({ rules: RULES[value] }));
     on("parts", ({ dataset }) => this.lab.restart({ rules: this.scene.rules ^ PARTS[dataset.part] }));
     on("learner", ({ value }) => this.lab.restart({ learner: Number(value) }));
@@ -130,7 +115,7 @@ export class Controls {
       byId(`c-${name}`).value = String(stepOf(steps, scene[name]));
       this.say(name, words(scene[name]));
     }
-    byId("learns").setAttribute("aria-checked", String(Boolean(scene.learns)));
+    byId("learns").checked = Boolean(scene.learns);
     const foraging = scene.rules && !(scene.rules & PARTS.queues);
     const rules = scene.rules & PARTS.queues ? "queueing" : foraging ? "foraging" : "paper", { world, learner, seed } = scene;
     byId("parts").hidden = !foraging;
@@ -141,34 +126,22 @@ export class Controls {
     for (const [id, value] of Object.entries(shown)) byId(id).value = String(value);
   }
 
-  /** Buttons of which one is chosen; arrow keys choose the next one. */
+  /** Inputs of which one is chosen; return what marks the present one. */
   radios(box, items, now, choose) {
-    box.innerHTML = items.map(([id, html, label]) => `<button role="radio" data-value="${id}" aria-label="${label}" title="${label}">${html}</button>`).join("");
-    const buttons = [...box.children];
-    const mark = () => buttons.forEach((button, k) => {
-      const chosen = items[k][0] === now();
-      button.setAttribute("aria-checked", String(chosen));
-      button.tabIndex = chosen ? 0 : -1;
-    });
-    buttons.forEach((button, k) => button.addEventListener("click", () => { choose(items[k][0]); mark(); }));
-    box.addEventListener("keydown", (event) => {
-      const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
-      if (!step) return;
-      event.preventDefault();
-      const next = buttons[(buttons.indexOf(event.target) + step + buttons.length) % buttons.length];
-      next.click();
-      next.focus();
-    });
+    box.innerHTML = items.map(([id, html, label]) => `<label data-value="${id}" title="${label}"><input type="radio" name="${box.id}" aria-label="${label}">${html}</label>`).join("");
+    const inputs = [...box.querySelectorAll("input")];
+    const mark = () => inputs.forEach((input, k) => { input.checked = items[k][0] === now(); });
+    inputs.forEach((input, k) => input.addEventListener("change", () => choose(items[k][0])));
     mark();
     return mark;
   }
 
   key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || /INPUT|SELECT|TEXTAREA/.test(event.target.tagName)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input:not([type=radio]), select, textarea")) return;
     const brush = { r: "rock", f: "food", t: "scent", e: "erase", l: "look" }[event.key.toLowerCase()];
-    if (brush) /** @type {HTMLElement} */ (document.querySelector(`#brushes [data-value="${brush}"]`)).click();
+    if (brush) /** @type {HTMLElement} */ (document.querySelector(`#brushes [data-value="${brush}"] input`)).click();
     if (event.key.toLowerCase() === "z") this.lab.undo();
-    if (event.key === " " && event.target.tagName !== "BUTTON" && event.target.tagName !== "SUMMARY") {
+    if (event.key === " " && !event.target.matches("button, summary, input")) {
       event.preventDefault();
       byId("play").click();
     }

@@ -1,10 +1,11 @@
 /* draw.js: a run on a canvas. Layers: ground, scent (one pixel a cell, drawn by one sheared and smoothed drawImage),
  * rocks and food, pick-ups and deliveries, ants, arrows of the policy, the brush. */
 
-import { CAPACITY, FOOD, hexDistance, ROCK, STEPS } from "./engine.js";
+import { CAPACITY } from "./engine.js";
 import { angleOf, centre, ROOT3, scatter } from "./geometry.js";
 import { fade, LOOKS, scentRamp } from "./looks.js";
 import { outline } from "./shapes.js";
+import { FOOD, hexDistance, ROCK, STEPS } from "./worlds.js";
 
 const DIRECTIONS = 32;          // of the pictures of ants
 const MOST_PIXELS = 2;          // per CSS pixel
@@ -14,46 +15,38 @@ const POINTER = [[0, 0], [0, 20], [5, 15], [8, 22], [11, 21], [8, 14], [14, 14]]
 
 export class Painter {
   /** @type {import("./run.js").Run} */ run;
-  look = LOOKS.dark;
-  theme = "dark";
-  dpr = 1;             // pixels per CSS pixel
-  s = 1;               // pixels per unit of geometry.js
-  x0 = 0;              // where its origin is
-  y0 = 0;
-  antLength = 1;
-  spriteSide = 1;
-  ramp = new Uint32Array(256);
   ground = document.createElement("canvas");
   things = document.createElement("canvas");
   scent = document.createElement("canvas");  // one pixel a cell
   bloom = document.createElement("canvas");
   sprites = document.createElement("canvas");
-  shown = new Float32Array(0);               // levels of scent on their way to the present ones
-  blurred = new Float32Array(0);
+  angles = new Float32Array(CAPACITY);
 
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
-    this.angles = new Float32Array(CAPACITY);
   }
 
   /** Prepare for a run, a size of the canvas and a theme. */
   fit(run, theme) {
     const box = this.canvas.getBoundingClientRect(), e = run.engine;
-    [this.run, this.theme, this.look] = [run, theme, LOOKS[theme]];
-    this.dpr = Math.min(MOST_PIXELS, window.devicePixelRatio || 1);
+    this.run = run;
+    this.look = LOOKS[theme];
+    this.dpr = Math.min(MOST_PIXELS, window.devicePixelRatio || 1); // pixels per CSS pixel
     const w = Math.max(1, Math.round(box.width * this.dpr)), h = Math.max(1, Math.round(box.height * this.dpr));
     for (const one of [this.canvas, this.ground, this.things]) [one.width, one.height] = [w, h];
     const margin = 6 * this.dpr, R = e.radius - 1;
-    this.s = Math.min((w - 2 * margin) / (3 * R + 2), (h - 2 * margin) / (2 * ROOT3 * R + 1.9)); // pixels per unit
-    [this.x0, this.y0] = [w / 2, h / 2];
+    this.s = Math.min((w - 2 * margin) / (3 * R + 2), (h - 2 * margin) / (2 * ROOT3 * R + 1.9)); // pixels per unit of geometry.js
+    this.x0 = w / 2; // where its origin is
+    this.y0 = h / 2;
     this.headroom = (h / 2 + (ROOT3 * R + 2) * this.s) / this.dpr; // CSS pixels from the bottom to the top of the world
     this.scent.width = this.scent.height = e.width;
     this.bloom.width = this.bloom.height = Math.ceil(e.width / 3);
     this.image = this.scent.getContext("2d").createImageData(e.width, e.width);
     this.pixels = new Uint32Array(this.image.data.buffer);
-    [this.shown, this.blurred] = [new Float32Array(e.size), new Float32Array(e.size)];
+    this.shown = new Float32Array(e.size); // levels of scent on their way to the present ones
+    this.blurred = new Float32Array(e.size);
     this.ramp = scentRamp(this.look.scent);
     for (let i = 0; i < e.ants; i++) this.angles[i] = angleOf(e.headings[i]);
     this.drawSprites();
@@ -76,7 +69,8 @@ export class Painter {
   drawSprites() {
     const length = Math.max(2.1 * this.s, 7.2 * this.dpr), side = Math.ceil(length * 1.6), { look } = this;
     const small = length < 11 * this.dpr;
-    [this.antLength, this.spriteSide] = [length, side];
+    this.antLength = length;
+    this.spriteSide = side;
     [this.sprites.width, this.sprites.height] = [side * DIRECTIONS, side * 4];
     const x = this.sprites.getContext("2d");
     for (let row = 0; row < 4; row++) {
@@ -88,11 +82,7 @@ export class Painter {
         [x.shadowColor, x.shadowBlur, x.shadowOffsetY] = [look.shadow, 2.5 * this.dpr, this.dpr];
         drawLegs(x, look, row & 1 ? 0.07 : -0.07, small);
         x.fillStyle = look.ant;
-        for (const [place, rx, ry] of [[-0.27, 0.19, 0.125], [0.02, 0.125, 0.08], [0.25, 0.105, 0.095]]) {
-          x.beginPath();
-          x.ellipse(place, 0, rx, ry, 0, 0, TAU);
-          x.fill();
-        }
+        for (const [place, rx, ry] of [[-0.27, 0.19, 0.125], [0.02, 0.125, 0.08], [0.25, 0.105, 0.095]]) oval(x, place, 0, rx, ry).fill();
         if (row > 1) drawLoad(x, look, small);
         x.restore();
       }
@@ -102,17 +92,7 @@ export class Painter {
   /** The outline of the world as a path, `grow` units outside the centres of its outer cells. */
   hexagon(x, grow = 0) {
     const R = this.run.engine.radius - 1 + grow / ROOT3;
-    x.beginPath();
-    for (const [q, r] of STEPS) x.lineTo(...this.at(centre(q * R, r * R)));
-    x.closePath();
-  }
-
-  glow(x, [px, py], radius, colour) {
-    const gradient = x.createRadialGradient(px, py, 0, px, py, radius);
-    gradient.addColorStop(0, colour);
-    gradient.addColorStop(1, fade(colour));
-    x.fillStyle = gradient;
-    x.fillRect(px - radius, py - radius, 2 * radius, 2 * radius);
+    lines(x, STEPS.map(([q, r]) => this.at(centre(q * R, r * R)))).closePath();
   }
 
   drawGround() {
@@ -134,7 +114,7 @@ export class Painter {
       const size = (0.5 + scatter(k, 3, 100) / 75) * this.dpr;
       x.fillRect(scatter(k, 1, 4096) / 4096 * width, scatter(k, 2, 4096) / 4096 * height, size, size);
     }
-    this.glow(x, this.place(this.run.engine.queen), 8.5 * s, look.nestGlow);
+    glow(x, this.place(this.run.engine.queen), 8.5 * s, look.nestGlow);
     x.restore();
   }
 
@@ -148,10 +128,9 @@ export class Painter {
     }
     x.clearRect(0, 0, this.things.width, this.things.height);
     this.drawRocks(x, rocks);
-    for (const cell of foods) this.glow(x, this.place(cell), 3.2 * s, look.foodGlow);
+    for (const cell of foods) glow(x, this.place(cell), 3.2 * s, look.foodGlow);
     for (const cell of foods) this.drawFood(x, cell);
     this.drawNest(x);
-    this.foods = foods;
     this.piles = this.pilesOf(foods);
     e.changed = false;
   }
@@ -178,10 +157,8 @@ export class Painter {
       const [a, b] = this.place(cell), k = scatter(cell, 11, 100);
       if (k >= 62) continue;
       [x.fillStyle, x.globalAlpha] = k & 1 ? [look.rockLow, 0.5] : [look.rockTop, 0.28];
-      x.beginPath();
-      x.ellipse(a + (scatter(cell, 12, 100) / 50 - 1) * 0.8 * s, b + (scatter(cell, 13, 100) / 50 - 1) * 0.8 * s,
-                (0.08 + k / 260) * s, (0.06 + k / 380) * s, k, 0, TAU);
-      x.fill();
+      const [px, py] = [12, 13].map((axis) => (scatter(cell, axis, 100) / 50 - 1) * 0.8 * s);
+      oval(x, a + px, b + py, (0.08 + k / 260) * s, (0.06 + k / 380) * s, k).fill();
     }
     x.restore();
   }
@@ -191,7 +168,7 @@ export class Painter {
     const px = a + (scatter(cell, 21, 100) / 100 - 0.5) * 0.3 * s, py = b + (scatter(cell, 22, 100) / 100 - 0.5) * 0.3 * s;
     for (const [colour, dx, dy, radius, alpha] of [[1, 0, 0.1, 1, 1], [0, 0, 0, 0.92, 1], [2, -0.16, -0.18, 0.34, 0.8]]) {
       [x.fillStyle, x.globalAlpha] = [look.food[colour], alpha];
-      circle(x, px + dx * s, py + dy * s, size * radius).fill();
+      oval(x, px + dx * s, py + dy * s, size * radius).fill();
     }
     x.globalAlpha = 1;
   }
@@ -199,16 +176,13 @@ export class Painter {
   drawNest(x) {
     const { look } = this, [nx, ny] = this.place(this.run.engine.queen), size = Math.max(this.s, 3 * this.dpr);
     [x.fillStyle, x.strokeStyle, x.globalAlpha, x.lineWidth] = [look.nest, look.nest, 0.45, 0.16 * size];
-    circle(x, nx, ny, 1.55 * size).stroke();
+    oval(x, nx, ny, 1.55 * size).stroke();
     x.globalAlpha = 1;
     x.save();
     x.translate(nx, ny);
     x.rotate(-0.5);
-    for (const [place, rx, ry] of [[-0.62, 0.62, 0.4], [0.16, 0.34, 0.25], [0.66, 0.27, 0.25]]) { // the queen
-      x.beginPath();
-      x.ellipse(place * size, 0, rx * size, ry * size, 0, 0, TAU);
-      x.fill();
-    }
+    for (const [place, rx, ry] of [[-0.62, 0.62, 0.4], [0.16, 0.34, 0.25], [0.66, 0.27, 0.25]]) // the queen
+      oval(x, place * size, 0, rx * size, ry * size).fill();
     x.restore();
   }
 
@@ -228,7 +202,7 @@ export class Painter {
 
   /** Draw a frame. `part` of the present tick has passed, `passed` seconds since the frame before. */
   frame(part, passed, ui) {
-    const x = this.context, e = this.run.engine, { s, look } = this;
+    const x = this.context, e = this.run.engine, { s } = this;
     if (e.changed) this.drawThings();
     x.setTransform(1, 0, 0, 1, 0, 0);
     [x.globalCompositeOperation, x.globalAlpha] = ["copy", 1];
@@ -247,8 +221,6 @@ export class Painter {
     this.labelScent(x, nx, ny, size);
     if (ui.ghost) this.drawGhost(x, ui);
     if (ui.pointer) this.drawBrush(x, ui);
-    x.globalAlpha = 1;
-    x.fillStyle = look.ant;
   }
 
   label(x, text, px, py, size) {
@@ -346,7 +318,7 @@ export class Painter {
   ring(x, px, py, hero, ui) {
     const beat = hero && !ui.still ? 1.15 + 0.2 * Math.sin(ui.now / 260) : 1;
     [x.strokeStyle, x.lineWidth] = [hero ? this.look.load : this.look.ghost, 1.6 * this.dpr];
-    circle(x, px, py, this.antLength * 0.95 * beat).stroke();
+    oval(x, px, py, this.antLength * 0.95 * beat).stroke();
   }
 
   drawSparks(x, passed, ui) {
@@ -356,7 +328,7 @@ export class Painter {
     for (const { cell, food, age } of run.sparks) {
       x.globalAlpha = (1 - age) * (food ? 0.7 : 0.4);
       [x.strokeStyle, x.lineWidth] = [food ? look.food[2] : look.nest, (1 - age) * 0.35 * s + 0.5];
-      circle(x, ...this.place(cell), (food ? 0.6 + 1.4 * age : 1.6 + 4.2 * age) * s).stroke();
+      oval(x, ...this.place(cell), (food ? 0.6 + 1.4 * age : 1.6 + 4.2 * age) * s).stroke();
     }
     x.globalAlpha = 1;
   }
@@ -375,10 +347,10 @@ export class Painter {
         if (length < 0.12) continue;
         const [px, py] = this.at(centre(q, r)), k = s * 1.35 * Math.min(1, length * 1.6) / length, ux = dx * k, uy = dy * k;
         x.moveTo(px - ux, py - uy);
-        x.lineTo(px + ux, py + uy);
-        x.moveTo(px + ux - 0.5 * ux - 0.32 * uy, py + uy - 0.5 * uy + 0.32 * ux);
-        x.lineTo(px + ux, py + uy);
-        x.lineTo(px + ux - 0.5 * ux + 0.32 * uy, py + uy - 0.5 * uy - 0.32 * ux);
+        for (const aside of [0.32, -0.32]) { // the shaft and a half of the head, then the other half
+          x.lineTo(px + ux, py + uy);
+          x.lineTo(px + 0.5 * ux - aside * uy, py + 0.5 * uy + aside * ux);
+        }
       }
     }
     x.stroke();
@@ -393,18 +365,13 @@ export class Painter {
     const line = (alpha, width, dash, px, py) => {
       [x.globalAlpha, x.lineWidth] = [alpha, width];
       x.setLineDash(dash);
-      x.beginPath();
-      x.moveTo(ax, ay);
-      x.lineTo(px, py);
-      x.stroke();
+      lines(x, [[ax, ay], [px, py]]).stroke();
     };
     line(0.9, 2 * dpr, [5 * dpr, 7 * dpr], bx, by);
     line(0.4, 3.4 * this.s, [], hx, hy);
     x.globalAlpha = 1;
     [x.strokeStyle, x.lineWidth] = [look.halo, 2.5 * dpr];
-    x.beginPath();
-    for (const [px, py] of POINTER) x.lineTo(hx + px * dpr, hy + py * dpr);
-    x.closePath();
+    lines(x, POINTER.map(([px, py]) => [hx + px * dpr, hy + py * dpr])).closePath();
     x.stroke();
     x.fill();
     this.label(x, "drag", hx + 34 * dpr, hy + 17 * dpr, 15 * dpr);
@@ -424,7 +391,7 @@ export class Painter {
     x.stroke(shape);
     x.globalAlpha = 1;
     if (ui.focused) { // by keyboard, the brush must be found
-      circle(x, ...this.at(centre(...ui.pointer)), (ui.reach * ROOT3 + 2.4) * s).stroke();
+      oval(x, ...this.at(centre(...ui.pointer)), (ui.reach * ROOT3 + 2.4) * s).stroke();
     }
   }
 }
@@ -444,11 +411,27 @@ function flowAt(engine, cell, carries) {
   return [dx, dy];
 }
 
-/** The outline of a circle as the path of a context. @returns {CanvasRenderingContext2D} */
-function circle(x, px, py, radius) {
+/** The outline of an ellipse, or of a circle, as the path of a context. @returns {CanvasRenderingContext2D} */
+function oval(x, px, py, across, along = across, angle = 0) {
   x.beginPath();
-  x.arc(px, py, radius, 0, TAU);
+  x.ellipse(px, py, across, along, angle, 0, TAU);
   return x;
+}
+
+/** Lines between points as the path of a context. @returns {CanvasRenderingContext2D} */
+function lines(x, points) {
+  x.beginPath();
+  for (const [px, py] of points) x.lineTo(px, py);
+  return x;
+}
+
+/** A glow around a point, in a colour that ends with its opacity. */
+function glow(x, [px, py], radius, colour) {
+  const gradient = x.createRadialGradient(px, py, 0, px, py, radius);
+  gradient.addColorStop(0, colour);
+  gradient.addColorStop(1, fade(colour));
+  x.fillStyle = gradient;
+  x.fillRect(px - radius, py - radius, 2 * radius, 2 * radius);
 }
 
 function drawLegs(x, look, swing, small) {
@@ -468,13 +451,9 @@ function drawLegs(x, look, swing, small) {
 
 /** Food in front of the head, with a ring: shape and size tell it from scent, not only its colour. */
 function drawLoad(x, look, small) {
-  const glow = x.createRadialGradient(0.42, 0, 0, 0.42, 0, 0.36);
-  glow.addColorStop(0, look.loadGlow);
-  glow.addColorStop(1, fade(look.loadGlow));
-  x.fillStyle = glow;
-  x.fillRect(0, -0.45, 0.85, 0.9);
+  glow(x, [0.42, 0], 0.36, look.loadGlow);
   [x.fillStyle, x.strokeStyle, x.lineWidth] = [look.load, look.edge, 0.07];
-  circle(x, 0.42, 0, small ? 0.2 : 0.165).stroke();
+  oval(x, 0.42, 0, small ? 0.2 : 0.165).stroke();
   x.shadowColor = "transparent";
   x.fill();
 }

@@ -2,6 +2,7 @@
  * `?bare` in the address hides all but the world, the play button and the brushes. */
 
 import { visitOf } from "./address.js";
+import { lineTo } from "./geometry.js";
 import { SETTING_KINDS, STROKES } from "./link.js";
 
 const MOST_TICKS = 100_000, FASTEST_MS = 50;
@@ -58,10 +59,9 @@ export class Embed {
   draw({ do: brush, reach, path }) {
     const { engine } = this.lab.runs[0];
     if (!Object.hasOwn(STROKES, brush) || !(reach >= 0 && reach <= 7)) throw new Error(`strokes: \`do\` is one of ${Object.keys(STROKES).join(", ")}, \`reach\` 0 to 7.`);
-    const cells = path.map(([q, r]) => engine.at(q, r));
-    if (!cells.length || !path.every(([q, r]) => engine.exists(q, r))) throw new Error("strokes: a path has cells [q, r] of the world.");
-    const whole = cells.slice(1).reduce((all, cell) => all.concat(engine.line(all[all.length - 1], cell).slice(1)), [cells[0]]);
-    this.lab.act({ do: brush, reach, path: whole });
+    if (!path.length || !path.every(([q, r]) => engine.exists(q, r))) throw new Error("strokes: a path has cells [q, r] of the world.");
+    const cells = path.flatMap((cell, k) => (k ? lineTo(path[k - 1], cell) : [cell]));
+    this.lab.act({ do: brush, reach, path: cells.map(([q, r]) => engine.at(q, r)) });
   }
 
   facts() {

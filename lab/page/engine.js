@@ -29,14 +29,14 @@
  *            looks (carries | event << 1 | action << 4; see EVENTS and ACTIONS), states (see `mind`)
  *   by state: values (8 floats each, the first 5 are those of ACTIONS)
  *
- *   engine.mind(ant)      what an ant sees and will do: { carries, codes: [left, forward, right],
- *                         levels: [...], state, values: [5], best: [actions], next, why }
- *                         `codes` index LETTERS; `why` is "best", "tie" (of several best actions),
- *                         "explores", or "was best" (SARSA draws an action before it learns)
+ *   engine.mind(ant)      what an ant sees and will do: { carries, state, values: [5], best: [actions],
+ *                         next, why }; `why` is "best", "tie" (of several best actions), "explores",
+ *                         or "was best" (SARSA draws an action before it learns)
  *   engine.policy(cell, heading, carries)   { state, values, best } of an ant that would stand there
+ *   engine.codesOf(state), .valuesOf(state)   what it is, and what each action is worth in it
  *
  * CELLS are numbers: engine.at(q, r), engine.q(cell), engine.r(cell), engine.exists(q, r),
- *   engine.disc(cell, reach), engine.line(from, to); STEPS[heading] is the step (q, r) to a neighbour.
+ *   engine.disc(cell, reach); STEPS[heading] is the step (q, r) to a neighbour.
  *
  * LONE ANTS (ant.wasm)
  *   const lone = new LoneAnts(module)
@@ -48,30 +48,22 @@
  */
 
 import FOLLOWERS from "./followers.json" with { type: "json" };
-import { makeWorld } from "./worlds.js";
+import { EMPTY, FOOD, hexDistance, makeWorld, QUEEN, ROCK, STEPS } from "./worlds.js";
 
 /** @typedef {import("./worlds.js").Scene} Scene */
 /** @typedef {{ do: "rock" | "food" | "scent" | "trail" | "erase", reach: number, path: number[], tick?: number }} Stroke */
 /** @typedef {{ do: "ants" | "epsilon" | "rate" | "discount" | "level" | "shaping" | "learns", value: number, tick?: number }} Setting */
 /** @typedef {Stroke | Setting} Change */
 
-export const EMPTY = 0, ROCK = 5, FOOD = 7, QUEEN = 13; // what is on a cell
 export const ACTIONS = ["turn left", "go on", "turn right", "pick up", "give"];
 export const EVENTS = { entered: 0, failed: 1, shaped: 2, pickedUp: 3, delivered: 4 };
-// What ants see: E empty, O obstacle, T trail or S nearer to the nest, F food or Q queen, and ants:
-// P with the other load on a better cell, A with the other load, p with the same load on a better one.
-export const LETTERS = [["E", "O", "T", "F", "P", "A", "p"], ["E", "O", "S", "Q", "P", "A", "p"]];
 /** The bits of rules: trails that rise towards food, right of way, ants that see ants, queues. */
 export const PARTS = { directed: 1, rightOfWay: 2, seesAnts: 4, queues: 8 };
 export const RULES = { paper: 0, foraging: 7, queueing: 15 };
 export const LEARNERS = { q_learning: 0, sarsa: 1, frozen: 2 };
 export const CAPACITY = 10000;
-/** Steps (q, r) to the neighbours of a cell by heading, clockwise; heading 0 points up. */
-export const STEPS = [[1, 0], [1, 1], [0, 1], [-1, 0], [-1, -1], [0, -1]];
 const START_LEVEL = 25;
 
-/** The distance of two cells that are (q, r) apart. */
-export const hexDistance = (q, r) => Math.max(q, r, 0) - Math.min(q, r, 0);
 /** The largest values of settings, as links have them: some in thousandths. */
 export const LIMITS = {
   seed: Number.MAX_SAFE_INTEGER, ants: CAPACITY, epsilon: 1000, rate: 1000, discount: 1000,
@@ -85,7 +77,6 @@ export function allowed(name, value) {
   const unit = THOUSANDTHS.includes(name) ? 1000 : 1;
   return Math.max(leastOf(name), Math.min(LIMITS[name], Math.round(value * unit))) / unit;
 }
-const bits = (mask) => ACTIONS.map((_, a) => a).filter((a) => mask >> a & 1);
 
 export class Engine {
   /**
@@ -139,7 +130,7 @@ export class Engine {
     this.looks = at(9, Uint8Array, n);
     this.states = at(10, Uint16Array, n);
     this.values = at(11, Float32Array, 8 * this.wasm.states());
-    this.read = at(12, Int32Array, 16);
+    this.read = at(12, Int32Array, 4);
   }
 
   // Cells are only packed when somebody looks at them.
@@ -247,8 +238,8 @@ export class Engine {
   mind(ant) {
     this.wasm.read_mind(ant);
     const carries = this.looks[ant] & 1, seen = this.seen();
-    const next = this.read[9], only = seen.best.length > 1 ? "tie" : "best";
-    return { ...seen, carries, next, why: this.read[10] ? "explores" : seen.best.includes(next) ? only : "was best" };
+    const next = this.read[2], only = seen.best.length > 1 ? "tie" : "best";
+    return { ...seen, carries, next, why: this.read[3] ? "explores" : seen.best.includes(next) ? only : "was best" };
   }
 
   /** What an ant with this place and load would see, and its best actions. */
@@ -258,11 +249,16 @@ export class Engine {
   }
 
   seen() {
-    const read = this.read, state = read[0];
-    return {
-      state, best: bits(read[1]), codes: [...read.slice(2, 5)], levels: [...read.slice(5, 8)], level: read[8],
-      values: [...this.values.slice(8 * state, 8 * state + 5)],
-    };
+    const [state, best] = this.read;
+    return { state, best: ACTIONS.map((_, a) => a).filter((a) => best >> a & 1), values: this.valuesOf(state) };
+  }
+
+  valuesOf(state) { return [...this.values.subarray(8 * state, 8 * state + 5)]; }
+
+  /** The load, and codes of the cells left, ahead and right, of a state. @returns {number[]} */
+  codesOf(state) {
+    const n = [4, 6, 7].find((codes) => 16 * codes ** 3 >= this.values.length); // that a cell can have
+    return [Math.floor(state / n ** 3), Math.floor(state / n ** 2) % n, Math.floor(state / n) % n, state % n];
   }
 
   // Cells
@@ -276,18 +272,6 @@ export class Engine {
       for (let a = -reach; a <= reach; a++)
         if (hexDistance(a, b) <= reach && this.exists(q + a, r + b)) found.push(this.at(q + a, r + b));
     return found;
-  }
-  /** A path of adjacent cells between two cells, along the straight line. */
-  line(from, to) {
-    const path = [from], n = hexDistance(this.q(to) - this.q(from), this.r(to) - this.r(from));
-    const apart = (cell) => hexDistance(this.q(to) - this.q(cell), this.r(to) - this.r(cell));
-    const off = (cell) => Math.abs((this.q(cell) - this.q(from)) * (this.r(to) - this.r(from)) - (this.r(cell) - this.r(from)) * (this.q(to) - this.q(from)));
-    for (let left = n - 1, cell = from; left >= 0; left--) {
-      const near = STEPS.map(([q, r]) => cell + q + r * this.width).filter((one) => apart(one) === left);
-      cell = near.reduce((a, b) => (off(b) < off(a) ? b : a));
-      path.push(cell);
-    }
-    return path;
   }
 }
 

@@ -1,6 +1,6 @@
 /* film.js: six seconds as a video, cropped to the world. */
 
-import { byId } from "./controls.js";
+import { byId } from "./page.js";
 
 const SECONDS = 6, BITS = 3.4e6, MOST_PIXELS_WIDE = 900, FRAMES = 30; // 3.4 Mbit/s: about 2.6 MB
 const CANNOT = "This browser cannot record a canvas.";

@@ -1,6 +1,6 @@
 /* geometry.js: where cells lie. The unit of length is the distance from the centre of a cell to its corners. */
 
-import { wordOf } from "./worlds.js";
+import { hexDistance, wordOf } from "./worlds.js";
 
 export const ROOT3 = Math.sqrt(3);
 
@@ -18,6 +18,12 @@ export function cellAt(x, y) {
   if (dq > dr && dq > dp) Q = R - P;
   else if (dr > dp) R = P + Q;
   return [Q, R];
+}
+
+/** The cells on the straight line between two cells, without the first one; each is a neighbour of the one before. */
+export function lineTo([q0, r0], [q1, r1]) {
+  const n = hexDistance(q1 - q0, r1 - r0), [x0, y0] = centre(q0, r0), [x1, y1] = centre(q1, r1);
+  return Array.from({ length: n }, (_, k) => cellAt(x0 + (x1 - x0) * (k + 1) / n, y0 + (y1 - y0) * (k + 1) / n));
 }
 
 /** A whole number below n that looks random but depends only on a and b. */

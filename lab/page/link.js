@@ -15,8 +15,8 @@
  * Numbers marked * can be negative: n is written as 2 n, or -2 n - 1. Each part of a stroke between
  * waits is an event, which paints all cells within `reach` of its path.
  */
-import { LIMITS, SIGNED, STEPS, THOUSANDTHS, hexDistance, leastOf } from "./engine.js";
-import { WORLDS } from "./worlds.js";
+import { LIMITS, SIGNED, THOUSANDTHS, leastOf } from "./engine.js";
+import { hexDistance, STEPS, WORLDS } from "./worlds.js";
 
 /** @typedef {import("./worlds.js").Scene} Scene */
 /** @typedef {import("./engine.js").Change} Change */

@@ -2,23 +2,20 @@
 
 import { Address } from "./address.js";
 import { Brush } from "./brush.js";
-import { byId, Controls, icon } from "./controls.js";
+import { Controls } from "./controls.js";
 import { Daily } from "./daily.js";
 import { Painter } from "./draw.js";
 import { Embed } from "./embed.js";
 import { Film } from "./film.js";
-import { STEPS } from "./engine.js";
 import { mindOf } from "./mind.js";
+import { byId, bytesOf, icon, openPage } from "./page.js";
 import { Plot } from "./plot.js";
 import { Run, TICKS_A_SECOND } from "./run.js";
 import { QUESTIONS, questionStory, settle } from "./scenes.js";
 import { many, storyOf } from "./story.js";
 import { Training } from "./train.js";
-import { SCENE } from "./worlds.js";
+import { SCENE, STEPS } from "./worlds.js";
 
-// @ts-ignore: build.py declares it before all modules
-const { COLONY_WASM, ANT_WASM } = BINARIES;
-const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 const MOST_TICKS_MS = 22; // of a frame; ticks that do not fit are dropped
 const WORDS_MS = 100;     // between two changes of words
 
@@ -38,7 +35,7 @@ const hasStroke = ({ engine, given }) => engine.events.some((event, k) => k >= g
 class Lab {
   constructor() {
     const calm = matchMedia("(prefers-reduced-motion: reduce)");
-    this.module = new WebAssembly.Module(bytesOf(COLONY_WASM));
+    this.module = new WebAssembly.Module(bytesOf("colony.wasm"));
     this.ui = { playing: true, speed: 1, brush: "rock", reach: 1, theme: "dark", pointer: null, down: false, focused: false,
                 followed: -1, hero: -1, ghost: null, arrows: "", still: calm.matches, now: 0 };
     calm.addEventListener("change", () => { this.ui.still = calm.matches; });
@@ -63,7 +60,7 @@ class Lab {
     this.address = new Address(this);
     this.film = new Film(this);
     this.daily = new Daily(this);
-    this.training = new Training(this, bytesOf(ANT_WASM));
+    this.training = new Training(this, bytesOf("ant.wasm"));
     this.brushes = this.sides.map((side) => new Brush(this, side));
     new ResizeObserver(() => { this.fits = false; }).observe(byId("views"));
     byId("questions").addEventListener("click", ({ target }) => {
@@ -73,6 +70,11 @@ class Lab {
     byId("options").addEventListener("click", ({ target }) => { if (target.dataset.say) this.say(Number(target.dataset.say)); });
     byId("learned").addEventListener("click", () => this.showMind(true));
     byId("mind").addEventListener("click", ({ target }) => { if (target.closest(".back")) this.showMind(false); });
+    this.play(true);
+    this.setTheme(/theme=light/.test(location.search) ? "light" : "dark"); // dark by default: bright scent needs dark ground
+    this.address.open();
+    new Embed(this);
+    requestAnimationFrame((now) => this.frame(now));
   }
 
   get runs() { return this.sides.filter((side) => side.run).map((side) => side.run); }
@@ -88,10 +90,7 @@ class Lab {
       side.view.hidden = !start;
       side.run = start ? new Run(this.module, start.scene, start.events) : null;
       if (start && start.skip) side.run.skip(start.skip);
-      if (start && question) {
-        side.run.watch();
-        side.run.given = (start.events || []).length;
-      }
+      if (start && question) side.run.watch();
       side.caption.hidden = !start || !start.label;
       side.caption.innerHTML = start && start.label || "";
       const what = starts.length > 1 ? `The ${k ? "right" : "left"} world` : "The world";
@@ -312,20 +311,4 @@ class Lab {
   }
 }
 
-function start() {
-  const lab = new Lab();
-  lab.play(true);
-  lab.setTheme(/theme=light/.test(location.search) ? "light" : "dark"); // dark by default: bright scent needs dark ground
-  lab.address.open();
-  new Embed(lab);
-  Object.assign(window, { lab });
-  requestAnimationFrame((now) => lab.frame(now));
-}
-
-try {
-  start();
-} catch (error) {
-  byId("headline").textContent = "This browser cannot run the lab.";
-  byId("sub").textContent = "It needs WebAssembly with SIMD. Please update the browser, or try another one.";
-  throw error;
-}
+openPage("lab", Lab);

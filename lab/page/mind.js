@@ -5,7 +5,6 @@ import { LOOKS } from "./looks.js";
 
 /* Codes of a cell: empty, obstacle, trail or way home, food or queen, promising ant, other ant, queue. */
 const OBSTACLE = 1, LURE = 2, GOAL = 3, PROMISING = 4, QUEUE = 6;
-const CODES = [4, 6, 7]; // that a cell can have, by the size of the table
 const SITUATIONS = [     // words, and the views they mean
   { name: "Nothing in view", fits: (load, l, a, r) => !load && !l && !a && !r },
   { name: "Food in front", fits: (load, l, a) => !load && a === GOAL },
@@ -18,14 +17,6 @@ const SITUATIONS = [     // words, and the views they mean
 ];
 const CELLS = [[-26, 22], [0, 7], [26, 22]];
 const HEXAGON = "M-15,0 -7.5,-13 7.5,-13 15,0 7.5,13 -7.5,13Z";
-
-/** Load, and the codes of the cells left, ahead and right, of a state. @returns {number[]} */
-function codesOf(engine, state) {
-  const states = engine.values.length / 8, n = CODES.find((codes) => 2 * codes ** 3 >= states);
-  return [Math.floor(state / n ** 3), Math.floor(state / n ** 2) % n, Math.floor(state / n) % n, state % n];
-}
-
-const valuesOf = (engine, state) => [...engine.values.subarray(8 * state, 8 * state + 5)];
 
 /** A view and its five values, as a drawing. @param {number[]} view load, and three codes */
 export function glyph(view, values, look) {
@@ -54,10 +45,10 @@ function summaryOf(run, fits) {
   const e = run.engine, often = [0, 0, 0, 0, 0], shown = [-1, -1, -1, -1, -1];
   let any = -1;
   for (let state = 0; state < run.visits.length; state++) {
-    if (!fits(...codesOf(e, state))) continue;
+    if (!fits(...e.codesOf(state))) continue;
     if (any < 0) any = state;
     if (!run.visits[state]) continue;
-    const values = valuesOf(e, state), best = values.indexOf(Math.max(...values));
+    const values = e.valuesOf(state), best = values.indexOf(Math.max(...values));
     often[best] += run.visits[state];
     if (shown[best] < 0 || run.visits[state] > run.visits[shown[best]]) shown[best] = state;
   }
@@ -70,7 +61,7 @@ const REASONS = { best: "its value is the highest", tie: "several are equally go
 function antCard(run, ant, look) {
   const mind = run.engine.mind(ant), words = mind.best.length > 3 ? "any action" : mind.best.map((k) => ACTIONS[k]).join(" or ");
   return `<div class="one card"><h3>Ant ${ant}, ${mind.carries ? "with" : "without"} food. It sees:</h3>`
-    + glyph([mind.carries, ...mind.codes], mind.values, look)
+    + glyph(run.engine.codesOf(mind.state), mind.values, look)
     + `<div class="does">${mind.why === "explores" ? ACTIONS[mind.next] : words} <span>${REASONS[mind.why]}</span></div></div>`;
 }
 
@@ -82,7 +73,7 @@ export function mindOf(run, ui) {
     if (!found) return "";
     const does = found.share < 0 ? '<div class="does none">never met</div>'
       : `<div class="does">${ACTIONS[found.top]} <span>${found.share} %</span></div>`;
-    return `<div class="card"><h3>${name}</h3>${glyph(codesOf(e, found.state), valuesOf(e, found.state), look)}${does}</div>`;
+    return `<div class="card"><h3>${name}</h3>${glyph(e.codesOf(found.state), e.valuesOf(found.state), look)}${does}</div>`;
   });
   const own = ui.followed >= 0 && ui.followed < e.ants ? antCard(run, ui.followed, look)
     : "<p>Click an ant with the eye to see what it sees, and why it does what it does.</p>";

@@ -1,8 +1,9 @@
 /* run.js: a colony that somebody watches: the engine, and measured facts about its past, which the story, the plot
  * and the drawing need. Nothing here changes what the ants do; it needs no DOM. */
 
-import { CAPACITY, Engine, EVENTS, FOOD, hexDistance, STEPS } from "./engine.js";
+import { CAPACITY, Engine, EVENTS } from "./engine.js";
 import { centre } from "./geometry.js";
+import { FOOD, hexDistance, STEPS } from "./worlds.js";
 
 export const TICKS_A_SECOND = 18;      // at speed 1
 const WINDOW = 200;                    // ticks over which food per minute is measured
@@ -73,10 +74,8 @@ export class Run {
     this.sparks = [];
   }
 
-  /** Begin to watch now: plots and questions count from here. */
-  watch() {
-    [this.start, this.earned, this.marks] = [this.tick, this.engine.returns, []];
-  }
+  /** Begin to watch now: plots and questions count from here, and what was done before is part of the question. */
+  watch() { [this.start, this.earned, this.given, this.marks] = [this.tick, this.engine.returns, this.engine.events.length, []]; }
 
   mark(word) { this.marks.push({ tick: this.tick, word }); }
 

@@ -1,7 +1,7 @@
 /* shapes.js: cells as smooth shapes: rocks look like stones, not like tiles. */
 
-import { STEPS } from "./engine.js";
 import { centre, ROOT3 } from "./geometry.js";
+import { STEPS } from "./worlds.js";
 
 /** The corner k of a cell; the edge to the neighbour at heading h lies between the corners h and h + 1. */
 function corner(q, r, k) {

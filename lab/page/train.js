@@ -1,8 +1,8 @@
 /* train.js: lone ants of the paper's grid, trained in the page: learning curves, and the whole grid. */
 
-import { byId } from "./controls.js";
 import { GRID, LoneAnts } from "./engine.js";
 import { pictureOf, plotOf, tableOf } from "./figures.js";
+import { byId } from "./page.js";
 import { many } from "./story.js";
 
 const SEEDS = 100, EPISODES = 500, LAST = 100; // the paper's; a quarter of the seeds is a whole number; results are means over the last episodes

@@ -26,9 +26,13 @@ export const SCENE = {
 };
 
 export const WORLDS = /** @type {any[]} */ (LAB.worlds);
-const PAINTS_EMPTY = 0, PAINTS_SCENT = 2, PAINTS_ROCK = 5, PAINTS_FOOD = 7;
-const STEP_Q = [1, 1, 0, -1, -1, 0], STEP_R = [0, 1, 1, 0, -1, -1];
-const lengthOf = (q, r) => Math.max(q, r, 0) - Math.min(q, r, 0);
+export const EMPTY = 0, ROCK = 5, FOOD = 7, QUEEN = 13; // what is on a cell
+const PAINTS_SCENT = 2; // what else a world can have
+/** Steps (q, r) to the neighbours of a cell by heading, clockwise; heading 0 points up. */
+export const STEPS = [[1, 0], [1, 1], [0, 1], [-1, 0], [-1, -1], [0, -1]];
+
+/** The distance of two cells that are (q, r) apart. */
+export const hexDistance = (q, r) => Math.max(q, r, 0) - Math.min(q, r, 0);
 
 /** A random word of 32 bits: a hash of two numbers. */
 export function wordOf(seed, number) {
@@ -44,12 +48,12 @@ function drawnShapes({ radius, queen, rocks, largest, piles, nearest, daily }, s
   const place = (least) => {
     for (;;) {
       const q = draw(2 * radius) - radius, r = draw(2 * radius) - radius;
-      if (lengthOf(q, r) < radius - LAB.fromEdge && lengthOf(q - queen[0], r - queen[1]) >= least) return [q, r];
+      if (hexDistance(q, r) < radius - LAB.fromEdge && hexDistance(q - queen[0], r - queen[1]) >= least) return [q, r];
     }
   };
   const shapes = [];
-  for (let k = 0; k < rocks; k++) shapes.push([PAINTS_ROCK, ...place(LAB.fromHome), draw(largest)]);
-  for (let k = 0; k < piles; k++) shapes.push([PAINTS_FOOD, ...place(nearest), LAB.pile]);
+  for (let k = 0; k < rocks; k++) shapes.push([ROCK, ...place(LAB.fromHome), draw(largest)]);
+  for (let k = 0; k < piles; k++) shapes.push([FOOD, ...place(nearest), LAB.pile]);
   return shapes;
 }
 
@@ -60,24 +64,24 @@ function drawnShapes({ radius, queen, rocks, largest, piles, nearest, daily }, s
 export function makeWorld({ world, seed }) {
   const lab = WORLDS[world], R = lab.radius, width = 2 * R + 1;
   const ground = new Uint8Array(width * width), scent = new Uint8Array(width * width);
-  if (lab.walled) ground.fill(PAINTS_ROCK);
+  if (lab.walled) ground.fill(ROCK);
   const shapes = lab.shapes.length ? lab.shapes : drawnShapes(lab, seed);
-  for (const [paints, q0, r0, square, heading = 0, n = 0] of [...shapes, [PAINTS_EMPTY, ...lab.queen, LAB.home]]) {
+  for (const [paints, q0, r0, square, heading = 0, n = 0] of [...shapes, [EMPTY, ...lab.queen, LAB.home]]) {
     const reach = Math.ceil(Math.sqrt(square * 4 / 3)) + 1;
     for (let k = 0; k <= n; k++) {
-      const q = q0 + k * STEP_Q[heading], r = r0 + k * STEP_R[heading];
+      const q = q0 + k * STEPS[heading][0], r = r0 + k * STEPS[heading][1];
       for (let b = -reach; b <= reach; b++)
         for (let a = -reach; a <= reach; a++)
-          if (a * a - a * b + b * b <= square && lengthOf(q + a, r + b) < R)
+          if (a * a - a * b + b * b <= square && hexDistance(q + a, r + b) < R)
             (paints === PAINTS_SCENT ? scent : ground)[(r + b + R) * width + q + a + R] = paints;
     }
   }
   /** @type {{ rocks: number[], foods: number[], scent: number[] }} */
   const cells = { rocks: [], foods: [], scent: [] };
   for (let cell = 0; cell < ground.length; cell++) {
-    if (lengthOf(cell % width - R, Math.floor(cell / width) - R) >= R) continue;
-    if (ground[cell] === PAINTS_ROCK) cells.rocks.push(cell);
-    if (ground[cell] === PAINTS_FOOD) cells.foods.push(cell);
+    if (hexDistance(cell % width - R, Math.floor(cell / width) - R) >= R) continue;
+    if (ground[cell] === ROCK) cells.rocks.push(cell);
+    if (ground[cell] === FOOD) cells.foods.push(cell);
     if (scent[cell]) cells.scent.push(cell);
   }
   return { name: lab.name, radius: R, queen: (lab.queen[1] + R) * width + lab.queen[0] + R, ...cells };

@@ -183,7 +183,6 @@ def call(kernel: Any, *arguments: Any) -> None:
 
 
 def _pass(context: Any, place: tuple[int], array: Any) -> None:
-    """Pass an array to a launch."""
     if isinstance(array, np.ndarray):
         address, size = array.ctypes.data, array.nbytes
         context.set_arg_external_array_with_shape(place, address, size, array.shape, 0)

@@ -1,12 +1,10 @@
 """The view of an ant in kernels, from which observations compute state indices."""
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import taichi as ti
 
-from taichi_ants.kernel_functions import kernel_function
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.vision import see_by_level, see_carrying, see_foraging, state_index
@@ -14,7 +12,7 @@ from taichi_ants.task.rules.vision import see_by_level, see_carrying, see_foragi
 
 @cache
 def view_type(observation: Observation, dense: bool, reads_dense: tuple[bool, ...] = ()) -> Any:
-    """Return the struct type for `encode`: vectors over cells in view, levels f32 if dense.
+    """Return the struct type of views: vectors over the cells in view, levels f32 if dense.
 
     `reads_dense` says so for each pheromone that the observation reads; by default, none is.
     """
@@ -62,9 +60,3 @@ def fill_codes(
     view.paper_state = state_index(
         view.carries, view.codes[left], view.codes[forward], view.codes[right]
     )
-
-
-@cache
-def encode_function(observation: Observation) -> Callable[..., Any]:
-    """Return an observation's `encode` for kernels."""
-    return kernel_function(observation.encode)

@@ -9,17 +9,9 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.envs import vector
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.vector import (
-    ACTION_MASKS,
-    Ants,
-    AntVectorEnv,
-    Arguments,
-    RenderMode,
-    Rules,
-    Step,
-    Worlds,
-)
+from taichi_ants.envs.vector import Ants, AntVectorEnv, Arguments, RenderMode, Rules, Worlds
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.features.support import BASE, CASTES, CHOICE
 from taichi_ants.task.constants import N_ACTIONS, RIGHT, Event
@@ -95,7 +87,7 @@ class ColonyWorlds(Ants):
     def over(self) -> np.ndarray:
         return self.colony.episode_ticks >= self.max_steps
 
-    def advance(self, actions: np.ndarray, waiting: np.ndarray) -> Step:
+    def advance(self, actions: np.ndarray, waiting: np.ndarray) -> vector.Step:
         if self.task.delivery == "terminates":  # the next episode of these ants has begun
             delivered = self.colony.events == Event.DELIVERED
             self.deliveries = np.where(delivered, 0, self.deliveries)
@@ -127,7 +119,7 @@ class ColonyWorlds(Ants):
         because they turn the ant.
         """
         colony, traffic = self.colony, self.task.traffic
-        masks = ACTION_MASKS.take(colony.paper_states, axis=0, mode="clip")
+        masks = vector.ACTION_MASKS.take(colony.paper_states, axis=0, mode="clip")
         if traffic.shared:
             base = np.arange(len(masks))[:, None] * colony.grid.size
             towards = colony.headings[..., None] + np.arange(-1, RIGHT)

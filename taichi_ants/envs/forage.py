@@ -16,20 +16,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from taichi_ants.arguments import checked_share
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.batched import BatchedEnvironments
+from taichi_ants.envs import vector
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.vector import (
-    ACTION_MASKS,
-    METADATA,
-    Ants,
-    AntVectorEnv,
-    Arguments,
-    Place,
-    RenderMode,
-    Rules,
-    Step,
-    Worlds,
-    checked_actions,
-)
+from taichi_ants.envs.vector import Ants, AntVectorEnv, Arguments, Place, RenderMode, Rules, Worlds
 from taichi_ants.errors import check_one_of, checked_whole, shown, whole
 from taichi_ants.features.support import CHOICE, LONE
 from taichi_ants.grid.constants import STREAM_ROLLOUT
@@ -53,10 +42,11 @@ _AFTER_END = {
     AutoresetMode.NEXT_STEP: Command.BEGIN,
     AutoresetMode.DISABLED: Command.WAIT,
 }
-_MASKS = list(ACTION_MASKS)  # faster than a view of a row at each step, like the next function
+# Faster than a view of a row at each step, like the next function.
+_MASKS = list(vector.ACTION_MASKS)
 _int64 = lru_cache(1 << 16)(np.int64)
 # Each row as a number of 8 bytes, because `take` of numbers is three times as fast.
-_PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64)[:, 0]
+_PACKED_MASKS = np.pad(vector.ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64)[:, 0]
 
 
 class LoneAnts(Ants):
@@ -82,7 +72,7 @@ class LoneAnts(Ants):
             self.batched.seed(list(seed_of.values()), np.array(list(seed_of)))
         self.batched.step(0, np.where(which, Command.BEGIN, Command.WAIT))
 
-    def advance(self, actions: np.ndarray, waiting: np.ndarray) -> Step:
+    def advance(self, actions: np.ndarray, waiting: np.ndarray) -> vector.Step:
         begins = waiting if self.mode is AutoresetMode.NEXT_STEP else 0
         self.batched.step(actions, begins, _AFTER_END[self.mode])
         arrays = self.batched.arrays
@@ -162,7 +152,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
     ([True, True, True, False, False], (720, 1280, 3))
     """
 
-    metadata = METADATA
+    metadata = vector.METADATA
     _ants: LoneAnts
 
     def __init__(
@@ -235,7 +225,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
     def action_masks(self) -> np.ndarray:
         """Return `info["action_mask"]` as bool (5,), for MaskablePPO of sb3-contrib."""
         self._ants.check_begun("action_masks()")
-        return ACTION_MASKS[self._ants.batched.arrays["paper_states"][0]].astype(bool)
+        return vector.ACTION_MASKS[self._ants.batched.arrays["paper_states"][0]].astype(bool)
 
     def render(self) -> Any:
         """Return a picture, uint8 (720, 1280, 3), or None without a render mode."""
@@ -427,7 +417,7 @@ def _checked_plan(
             plan = np.empty(0)
         if plan.dtype.kind in "iu":
             length = steps or max(1, np.atleast_1d(plan).shape[0])
-            actions = checked_actions(plan, (length, n))
+            actions = vector.checked_actions(plan, (length, n))
             return length, np.ascontiguousarray(actions, np.int64), None
         table = checked_table(policy, task)
     return checked_whole("steps", steps), None, table

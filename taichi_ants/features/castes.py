@@ -248,7 +248,6 @@ def _refusals(state: State) -> Iterator[str]:
 
 
 def _newborn(state: State, w: int, nests: np.ndarray, draw: Callable[[int], np.ndarray]) -> Any:
-    """Return the castes of newborn ants of some nests (n,), each by a draw."""
     import numpy as np
 
     if len(state.task.castes) == 1:
@@ -268,7 +267,6 @@ def _policies(task: Task) -> dict[int, tuple[str, str]]:
 
 
 def _without_policies(task: Task) -> Task:
-    """Return the task with policies that are not files."""
     follow = [name for name, caste in task.castes.items() if caste.policy is not None]
     return task.replace(castes={name: {"policy": "random"} for name in follow})
 

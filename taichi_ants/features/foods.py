@@ -134,7 +134,6 @@ PAID = Feature(Food, uses=lambda task: bool(task.foods), paid=_paid)
 
 @PAID.at("pays")
 def pay(a, event, reward):
-    """Pay for food by its kind."""
     if (event == _PICKED_UP) | (event == _DELIVERED):
         kind = ti.cast(a.kind, ti.i32)
         reward = a.food_numbers[_PICK_UP, kind]
@@ -145,7 +144,6 @@ def pay(a, event, reward):
 
 @PAID.at("waits")
 def wait(cell, kind, ticks):
-    """Let food grow back by its kind."""
     return cell.food_numbers[_REGROWTH, kind]
 
 
@@ -180,14 +178,12 @@ def take(a, cell, left):
 
 @HELD.at("dropped")
 def drop(a, cell):
-    """Leave one load of the kind."""
     cell.loads = 1
     cell.kind_of = ti.cast(a.kind, ti.u8)
 
 
 @HELD.at("filled")
 def fill(cell, kind, n):
-    """Give the cell all loads of a kind."""
     n = cell.food_numbers[_LOADS, kind]
     cell.loads = n
     cell.kind_of = ti.cast(kind, ti.u8)

@@ -232,13 +232,11 @@ def stay_idle(a, stream):
 
 @LABOUR.at("rests")
 def is_idle(a):
-    """Return whether the ant is idle."""
     return ti.cast(a.idle, ti.i32)
 
 
 @LABOUR.at("delivered")
 def relieve(nest, n):
-    """Lower the stimulus of a nest."""
     lowered = nest.stimulus - nest.task.labour.relief * ti.cast(n, ti.f64)
     nest.stimulus = ti.select(lowered > 0.0, lowered, ti.f64(0.0))
 
@@ -260,23 +258,19 @@ def stop(a):
 
 @LABOUR.at("stopped")
 def become_idle(a):
-    """Make the ant idle."""
     a.idle = ti.i8(1)
 
 
 @LABOUR.at("tick_ended")
 def demand(nest):
-    """Raise the stimulus of a nest."""
     nest.stimulus = nest.stimulus + nest.task.labour.demand
 
 
 @LABOUR.input("response threshold of the ant, 0 without one")
 def threshold(a):
-    """Return the response threshold, f32."""
     return a.threshold
 
 
 @LABOUR.input("stimulus of the ant's nest", by_deliveries=True)
 def stimulus(a):
-    """Return the stimulus of the nest, f64."""
     return a.stimulus

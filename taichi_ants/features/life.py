@@ -54,13 +54,11 @@ AGE = Feature(
 
 @AGE.at("born")
 def begin_young(a):
-    """Let the ant begin at age 0."""
     a.age = 0
 
 
 @AGE.at("aged")
 def grow_old(a):
-    """Let the ant die if it reaches its lifespan."""
     lifespan, dies = ti.cast(a.lifespan, ti.i32), False
     if lifespan > 0:
         a.age = a.age + 1

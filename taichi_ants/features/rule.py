@@ -1,4 +1,4 @@
-"""The names of rules: the built-in ones, and yours, with their functions and parameters."""
+"""The names of rules: those that the engine implements, and yours, which are functions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from taichi_ants.features.feature import Input
 from taichi_ants.registry import Registry
 from taichi_ants.settings import Settings, declared
 
-# The rules that the engine implements; built-in functions are in `rules/built_in.py`.
+# The rules that the engine implements.
 WORDS = {
     "choice": ("greedy", "softmax", "deneubourg"),
     "deposit": ("set", "add", "fading", "none"),
@@ -47,7 +47,7 @@ class Parameters(Settings, path="task.rules.NAME"):
 
 @dataclass(frozen=True, eq=False)
 class Rule:
-    """A rule that you wrote, or a built-in one: a function of inputs, and of parameters.
+    """A rule that you wrote: a function of inputs, and of parameters.
 
     Attributes:
         name: The name that tasks use.
@@ -89,7 +89,6 @@ class Rule:
         return math.floor(result) if form.is_whole else result
 
 
-# `rules/rule.py` adds the built-in functions.
 RULES: Registry[Rule] = Registry(
     *("rule", "taichi_ants.rules.register", {}),
     reserved=[name for names in WORDS.values() for name in names],
@@ -107,7 +106,7 @@ def registered(kind: str, name: str) -> Rule | None:
 
 
 def names(kind: str | None = None) -> tuple[str, ...]:
-    """Return the names of rules, of one kind or of all: built-in functions, then yours.
+    """Return the names of your rules, of one kind or of all.
 
     >>> rules.names("deposit")
     ()

@@ -14,7 +14,6 @@ from taichi_ants.task.constants import ROW
 
 @kernel_function
 def update(memory, at, rates, pair, transition):
-    """Update a pair and return its TD error."""
     error = model.error_of(memory, at, rates, pair, transition)
     memory.q[at.table + pair] = memory.q[at.table + pair] + rates.learning_rate * error
     return error

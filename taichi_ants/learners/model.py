@@ -47,7 +47,6 @@ def pack_transition(next_state, reward, terminated):
 
 @ti.func
 def next_state_of(transition):
-    """Return the next state of a transition."""
     return transition & (1 << _REWARD_AT) - 1
 
 
@@ -65,7 +64,6 @@ def terminated_of(transition):
 
 @ti.func
 def visited(memory: ti.template(), at):
-    """Return the number of visited pairs."""
     return memory.integers[at.integers]
 
 

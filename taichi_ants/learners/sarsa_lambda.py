@@ -29,7 +29,6 @@ class Traces(Hyperparameters):
 
 
 def begin(memory, at):
-    """Remove all traces."""
     memory.integers[at.integers] = 0
 
 

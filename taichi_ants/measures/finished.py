@@ -60,12 +60,10 @@ class Run:
 
     @classmethod
     def of_lone_ant(cls, outcome: Outcome) -> Run:
-        """Return the runs of an outcome of a `RunPoint`."""
         return cls(counts_of_lone_ant(outcome), counts_of_lone_ant(outcome, "greedy_"))
 
     @classmethod
     def of_colony(cls, outcome: Outcome, ants: int, ticks: int) -> Run:
-        """Return the runs of an outcome of a `ColonyPoint`."""
         counts = {name: outcome[name] for name in _COLONY_COUNTS}
         counts["ticks"] = np.broadcast_to(np.int32(ticks), outcome["deliveries"].shape)
         return cls({}, counts, ants, ticks)

@@ -45,7 +45,6 @@ class Intent:
 
     @property
     def enters(self) -> bool:
-        """Whether the ant tries to enter a cell."""
         return self.action < PICK_UP and self.target is not None
 
 

@@ -110,7 +110,6 @@ class ReferenceColony:
         return list(self.task.castes.values()) or [castes.ONE]
 
     def table_of(self, ant: Ant | Transition) -> int:
-        """Return the number of the table of an ant."""
         if self.sharing == "independent":
             return ant.slot
         return ant.nest * len(self.castes) + ant.caste
@@ -307,7 +306,6 @@ class ReferenceColony:
             self.record.births += 1
 
     def new_ant(self, cell: Cell, heading: int, slot: int, nest: int = 0, caste: int = 0) -> None:
-        """Add a new ant to a slot and a cell."""
         number = self.next_number
         stream = RandomStream(stream_state(self.seed, STREAM_BORN, (self.episode << 32) + number))
         ant = Ant(cell, heading, slot=slot, number=number, stream=stream, nest=nest, caste=caste)

@@ -23,6 +23,5 @@ def sense(world: WorldState, ant: Ant) -> Sense | None:
 
 
 def compass(world: WorldState, ant: Ant, cell: Cell) -> bool:
-    """Return whether a cell is nearer to the queen of an ant."""
     queen = world.queens[ant.nest]
     return distance(cell, queen) < distance(ant.cell, queen)

@@ -48,7 +48,6 @@ def listed_cells(rows: np.ndarray) -> list[Cell]:
 
 
 def queens_of(world: World) -> list[Cell]:
-    """Return the cells of the queens of a world, by nest."""
     return [world.queen, *listed_cells(world.other_queens)]
 
 

@@ -71,7 +71,6 @@ class ReferenceLearner:
         return np.float32(0) if step.terminated else self.discount
 
     def update(self, pair: Pair, weight: np.float32, error: np.float32) -> None:
-        """Add weight * error to the value of a pair."""
         state, action = pair
         self.rows[state][action] = self.rows[state][action] + weight * error
 
@@ -116,7 +115,6 @@ class DynaQ(QLearning):
         return error
 
     def draw_seen(self, stream: RandomStream) -> Transition:
-        """Return a random transition of the model."""
         return list(self.model.values())[pick(stream.draw()[0], len(self.model))]
 
 

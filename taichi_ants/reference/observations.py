@@ -208,7 +208,6 @@ def yours(observation: Observation, world: WorldState, ant: Ant) -> int:
     dense = any(world.pheromones[name].rule.dense for name in followed)
 
     def levels(trail: Trail, dense: bool) -> tuple[Vector, Any]:
-        """Return the levels of the cells, and that of the ant's cell."""
         kind: type = np.float32 if dense else np.int32
         in_view = levels_in_view(world, ant, trail, turns, ant.misread)
         return Vector(map(kind, in_view)), kind(trail.level(ant.cell))

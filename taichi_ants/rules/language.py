@@ -79,7 +79,6 @@ class _Translation:
         self._numbers = dict.fromkeys(n for n in numbers if n not in self._vectors)
 
     def source(self) -> str:
-        """Return the source of the function."""
         body = self._tree.body
         if ast.get_docstring(self._tree) is not None:
             body = body[1:]

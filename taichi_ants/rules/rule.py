@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type
 from taichi_ants.errors import AntsError, check_one_of, shown, unusable
 from taichi_ants.features.feature import Input
 from taichi_ants.features.rule import RULES, Parameters, Rule
-from taichi_ants.rules.built_in import FUNCTIONS
 from taichi_ants.rules.inputs import KINDS, drawn, field_of, input_of, values_shown
 from taichi_ants.rules.language import LanguageError, kernel_source
 from taichi_ants.settings import Setting, declared
@@ -147,10 +146,3 @@ def _try_in_python(rule: Rule) -> None:
         if fault:
             must = f"it must return {kind.result.split(':')[0]}, {form}"
             raise unusable(rule, f"{fault} for {values_shown(values)}, but {must}")
-
-
-RULES.built_in = {
-    function.__name__: _rule(function.__name__, kind, function)
-    for kind, functions in FUNCTIONS.items()
-    for function in functions
-}

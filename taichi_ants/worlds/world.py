@@ -19,8 +19,6 @@ from taichi_ants.worlds import validation
 
 Start = Literal["nest", "spread"]
 STARTS: tuple[str, ...] = get_args(Start)
-# The neighbours on the hexagonal grid in a 3 x 3 window (rows r, columns q).
-_NEIGHBOURS = np.array([[1, 1, 0], [1, 1, 1], [0, 1, 1]])
 _PARTS = ("foods", "obstacles", "trails", "ants")
 _MORE = ("food_kinds", "other_queens")  # empty in a world with one nest and one kind of food
 
@@ -208,13 +206,12 @@ class World:
         >>> world.walkable(world.start(seed=0)[0]).sum().item()
         269
         """
-        # Importing scipy.ndimage is slow, and most worlds do not need it.
-        from scipy.ndimage import label
-
-        ground = self.ground().reshape(self.grid.height, self.grid.width)
-        regions = label(ground == EMPTY, structure=_NEIGHBOURS)[0].reshape(-1)
-        home = regions[starts]
-        return np.isin(regions, home[home > 0])
+        free, reached = self.ground() == EMPTY, np.zeros(self.grid.size, bool)
+        new = np.asarray(starts)
+        while len(new := np.unique(new[free[new] & ~reached[new]])):
+            reached[new] = True
+            new = (new[:, None] + self.grid.offsets).ravel()
+        return reached
 
     def reachable_foods(self) -> np.ndarray:
         """Return for each food item whether an ant can walk to it from a queen, bool (F,).

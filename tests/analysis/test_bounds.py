@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plain_search import PlainWorld, search_all_sequences, search_optimal, search_shortest
+from plain_search import PlainWorld, search_optimal, search_shortest
 
 from taichi_ants.analysis import bounds as exact_bounds
 from taichi_ants.analysis.bounds import EpisodeBounds, ExpectedEpisode
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.task import Pheromone, Rewards, Task
+from taichi_ants.task import Rewards, Task
 from taichi_ants.worlds import paper
 from taichi_ants.worlds.world import World
 
@@ -67,13 +67,6 @@ def test_bounds_agree_with_plain_searches_for_any_rewards(
     assert_outcome(outcome, expected)
 
 
-def test_the_shortest_delivery_is_that_of_all_sequences_of_actions() -> None:
-    # Queen, ant, trail, food in a row; the ant faces away from the queen.
-    world = World((4, 1, 1), (0, 0, 0), [(3, 0, 0)], trails=[((2, 0, 0), 1)], ants=[((1, 0, 0), 0)])
-    shortest = search_all_sequences(PlainWorld(world), 6)
-    assert bounds_of(world).shortest() == ExpectedEpisode(*shortest) == ExpectedEpisode(15, 4, 1)
-
-
 # The world of the paper. On the line of the cells (i, 0, 0) the queen is at i = -9, the ant at
 # i = -8, the food at i = 9. An ant sees only neighbours, so it must come to a neighbour of the
 # food, 16 cells away at least, pick up (1), come back to a neighbour of the queen, 16 cells again,
@@ -109,27 +102,6 @@ def test_equal_actions_are_decided_by_the_lowest_number() -> None:
     world = World((3, 1, 1), (0, 0, 0), obstacles=[(2, 0, 0)], ants=[((1, 0, 0), 0)])
     assert bounds_of(world).optimal(0.0, 7) == (-1, ExpectedEpisode(-7, 7, 0))
     assert bounds_of(world).optimal(0.9, 7) == (pytest.approx(-10), ExpectedEpisode(-7, 7, 0))
-
-
-@pytest.mark.parametrize("discount", [-0.1, 1.0, 1.5, float("nan")])
-def test_a_discount_out_of_range_is_refused(discount: float) -> None:
-    with pytest.raises(AntsError, match=str(discount)):
-        bounds_of(paper()).optimal(discount, 600)
-
-
-@pytest.mark.parametrize(
-    "task", [Task(evaporation_in_training=True), Task(pheromone=Pheromone(diffusion=0.1))]
-)
-def test_trails_that_change_are_refused(task: Task) -> None:
-    with pytest.raises(
-        AntsError, match=r"constant trails|diffusion` is 0.1, which an exact bound does not support"
-    ):
-        EpisodeBounds(paper(), task)
-
-
-def test_a_world_that_is_too_large_is_refused() -> None:
-    with pytest.raises(AntsError, match=r"use a smaller world or fewer food items\.$"):
-        bounds_of(World((1000, 1000, 1), (0, 0, 0)))
 
 
 @pytest.mark.parametrize(

@@ -53,14 +53,9 @@ def pools() -> dict[str, np.ndarray]:
 def coverage(
     pool: np.ndarray, seeds: int, iqm: bool, level: float | None = None, draws: int = DRAWS
 ) -> float:
-    """The share of draws whose interval holds the pool's value.
+    """Return the share of draws of so many seeds whose interval holds the pool's value.
 
-    Args:
-        pool: Values of runs, float (runs,).
-        seeds: How many of them a draw has, each at most once.
-        iqm: Whether the estimator is the interquartile mean, else the mean.
-        level: None for the interval of tables, at 95 %; else the level of the interval of verdicts.
-        draws: How many draws.
+    Without a level, the interval is that of tables, at 95 %; else that of verdicts.
     """
     random = np.random.default_rng(seeds)
     values = pool[random.random((draws, len(pool))).argpartition(seeds, axis=1)[:, :seeds]]

@@ -20,13 +20,7 @@ def library(tmp_path_factory):
         return colony_in_c.load(compiler(1), tmp_path_factory.mktemp("c"), 1)
 
 
-@pytest.mark.parametrize(
-    "rules",
-    [
-        pytest.param(one, marks=[pytest.mark.slow] * (one == "foraging"))
-        for one in colony_in_c.TASKS
-    ],
-)
+@pytest.mark.parametrize("rules", ["the paper's", "queueing"])  # which has those of foraging
 def test_c_gives_the_same_colonies(rules, library):
     colony = colony_in_c.scattered(colony_in_c.TASKS[rules], 300)
     colony.begin_episode()

@@ -27,15 +27,6 @@ def ours():
     return [values.reshape(-1, EPISODES) for values in (result.returns, result.steps)]
 
 
-def assert_distributed_alike(ours, theirs):
-    for expected, given in zip(ours, theirs, strict=True):
-        for some in (slice(0, SEEDS), slice(SEEDS, None)):
-            for part in (slice(0, 10), slice(10, None)):  # before and after most is learned
-                a, b = expected[some, part].mean(axis=1), given[some, part].mean(axis=1)
-                error = np.sqrt((a.var(ddof=1) + b.var(ddof=1)) / SEEDS)
-                assert abs(a.mean() - b.mean()) < 3.5 * error
-
-
 @pytest.fixture(scope="module")
 def trace():
     """Forty episodes of one run: what it sees and does, and its table after each step."""
@@ -54,15 +45,10 @@ def test_numpy_steps_as_we_do(trace):
     assert [int(returned[0]) for _, returned, _ in run.ended] == returns.tolist()
 
 
-def test_numpy_trains_as_we_do(ours):
-    assert_distributed_alike(ours, numpy_runs.train(CONFIGS, SEEDS, EPISODES, STEPS))
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("parallel", [False, True])
-def test_numba_gives_the_same_runs(ours, parallel):
+def test_numba_gives_the_same_runs(ours):
     pytest.importorskip("numba")
     from systems import numba_runs
 
-    theirs = numba_runs.train(CONFIGS, SEEDS, EPISODES, STEPS, parallel)
+    theirs = numba_runs.train(CONFIGS, SEEDS, EPISODES, STEPS, parallel=True)
     assert all(map(np.array_equal, ours, theirs))

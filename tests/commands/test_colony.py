@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import os
 import signal
-import subprocess
-import sys
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
-from command_lines import EXPERIMENTS, assert_one_sentence, call, environment
+from command_lines import EXPERIMENTS, assert_one_sentence, call
 
-from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
+from taichi_ants import (
+    AntsError,
+    Colony,
+    Life,
+    Pheromone,
+    Task,
+    TrainingConfig,
+    load_policy,
+    worlds,
+)
 from taichi_ants.commands import colony as command
+from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.learners.policies import save_policy
+from taichi_ants.rendering import writers
 from taichi_ants.task import foraging, paper, queueing
 
 CALM = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
@@ -177,24 +188,48 @@ def test_rules_are_those_named_else_the_policys_else_queueing(
     assert command.rules(settings, policy) == expected
 
 
-def test_help_is_quick_and_needs_no_taichi(tmp_path):
-    script = (
-        "import sys\n"
-        "from taichi_ants.commands import run\n"
-        "try:\n"
-        "    run('colony', ['live', '--help'])\n"
-        "except SystemExit as end:\n"
-        "    assert end.code == 0\n"
-        "heavy = {'taichi', 'numpy', 'scipy', 'matplotlib', 'rich'} & set(sys.modules)\n"
-        "print('heavy:', sorted(heavy))\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        env=environment(tmp_path),
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert done.stdout.endswith("heavy: []\n")
-    for word in ("--ants", "--save", "--resume", "--render", "--task.pheromone.half-life"):
-        assert f"  {word}" in done.stdout
+def begun(ants=3):
+    colony = Colony(worlds.paper(), None, TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0), 4, ants)
+    colony.begin_episode()
+    return colony
+
+
+@pytest.mark.parametrize(
+    ("render", "encode", "ticks"), [("a.gif", "_with_palette", 6), ("a.png", "png", 20)]
+)
+def test_a_colony_is_saved_although_its_picture_cannot_be(
+    tmp_path, monkeypatch, render, encode, ticks
+):
+    def full(frames, *more, **named):
+        list(islice(frames, 4))  # of a GIF: at the start and after 2, 4, 6 ticks
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(writers, encode, full)
+    colony = begun()
+    save = str(tmp_path / "keep.npz")
+    files = save, str(tmp_path / render)
+    with pytest.raises((AntsError, OSError), match="o space left on device"):
+        command.live(colony, 20, lambda share: None, lambda: False, *files, frame_interval=2)
+    assert os.listdir(tmp_path) == ["keep.npz"]
+    other = begun()
+    other.tick(ticks)
+    saved = Colony.load(save)
+    assert saved.ticks == ticks
+    np.testing.assert_array_equal(saved.cells, other.cells)
+    np.testing.assert_array_equal(saved.q_values, other.q_values)
+
+
+def test_the_summary_counts_in_words():
+    def summed(**counts):
+        colony = begun(ants=1)
+        colony.tick(1)
+        for name, count in counts.items():
+            colony.arrays["worlds"][getattr(WorldRow, name.upper())] = count
+        return command.summary(colony, 1, 2.34)
+
+    one, two = summed(deliveries=1, births=1), summed(deliveries=2, births=2, deaths=1)
+    assert one.startswith("1 ant, 1 tick in 2.3 s.")
+    assert "\n1 delivery by tick 1, " in one
+    assert one.endswith(" % of the moves blocked, 1 birth.")
+    assert "\n2 deliveries by tick 1, " in two
+    assert two.endswith(" % of the moves blocked, 2 births, 1 death.")

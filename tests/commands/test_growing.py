@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
 import shutil
@@ -12,7 +11,15 @@ import time
 from pathlib import Path
 
 import pytest
-from command_lines import assert_one_sentence, assert_same_results, call, contents, promptly, start
+from command_lines import (
+    assert_one_sentence,
+    assert_same_results,
+    call,
+    contents,
+    descendants,
+    promptly,
+    start,
+)
 
 from taichi_ants.commands.status import status
 from taichi_ants.studies.folder import sessions_in, write_json
@@ -25,11 +32,7 @@ seeds = [7, 2, 5, 1]
 episodes = 6
 max_steps = 60
 rollouts = 3
-[training]
-learner = "sarsa"
-discount = 0.9
-epsilon = 0.3
-epsilon_decay = 0.99
+training = {learner = "sarsa", discount = 0.9, epsilon = 0.3, epsilon_decay = 0.99}
 [vary]
 training.learning_rate = [0.01, 0.1, 0.2]
 task.rewards.shaping = [1, 0]
@@ -347,17 +350,6 @@ def test_a_row_is_played_to_the_same_numbers(kind, sweep, capsys):
     assert call("watch", ["a", "--row", len(rows) + 1], capsys)[0] == 2
 
 
-def workers_of(pid):
-    """The processes that are children of a process, or of its children."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):
-            fields = path.read_text().rpartition(")")[2].split()
-            if int(fields[1]) == pid:
-                found += [int(path.parent.name), *workers_of(int(path.parent.name))]
-    return found
-
-
 @pytest.mark.parametrize(
     "number",
     [
@@ -376,7 +368,7 @@ def test_worker_processes_end_with_the_command_and_work_resumes(number, sweep, t
     until = time.monotonic() + 120
     while not list(Path("a").rglob("*.npz")) and time.monotonic() < until:
         time.sleep(0.05)
-    workers = workers_of(process.pid)
+    workers = descendants(process.pid)
     assert len(workers) >= 2
     began = time.monotonic()
     process.send_signal(number)

@@ -7,13 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_lines import EXPERIMENTS, assert_one_sentence, call, contents, numbers_in, read_csv
+from command_lines import EXPERIMENTS, assert_one_sentence, contents, numbers_in, read_csv
 
 from taichi_ants import (
     AntsError,
-    Colony,
-    Life,
-    Pheromone,
     Rewards,
     Task,
     TrainingConfig,
@@ -21,7 +18,7 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.studies.points import EVALUATION_SEEDS, RunPoint
+from taichi_ants.studies.points import RunPoint
 from taichi_ants.studies.sweep import plan, sweep_of
 from taichi_ants.task import foraging, paper
 
@@ -78,18 +75,6 @@ task.pheromone.half_life = [5, 10, 20]
 """
 
 
-@pytest.fixture
-def sweep(tmp_path, capsys, monkeypatch):
-    """Calls the command on a file of this text, in a folder of its own."""
-    monkeypatch.chdir(tmp_path)
-
-    def called(text, *more):
-        Path("my.toml").write_text(text, "utf-8")
-        return call("sweep", ["my.toml", *more], capsys)
-
-    return called
-
-
 # Deliveries are reported beside returns.
 MEASURES = ["return_last50", "greedy_deliveries", "deliveries_last50"]
 
@@ -131,36 +116,6 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
     assert (facts["task.delivery"], facts["seeds"]) == ("truncates", [7, 2, 5])
 
 
-def test_a_sweep_of_colonies_is_what_the_library_gives(sweep):
-    status, _, err = sweep(COLONY, "--no-figures")
-    assert (status, err) == (0, "")
-    rows = read_csv("results/sweep-my/runs.csv")
-    assert [row["task.pheromone.half_life"] for row in rows] == ["5", "5", "10", "10", "20", "20"]
-    several = [worlds.open_world(5 + seed, (12, 12, 12)) for seed in (0, 1)]
-    pheromone = Pheromone("exponential", half_life=10)
-    task = Task(pheromone=pheromone, evaporation_in_training=True, life=Life(regrowth=0))
-    colony = Colony(several, task, TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.9), (0, 1), 4)
-    colony.run(2, 60)
-    greedy = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
-    others = (EVALUATION_SEEDS, EVALUATION_SEEDS + 1)
-    table = colony.q_values
-    after = Colony(several, task, greedy, others, 4, sharing="frozen", q_values=table).run(2, 60)
-    expected = after.deliveries.mean(axis=0) * 1000 / 60
-    assert [float(row["deliveries"]) for row in rows[2:4]] == pytest.approx(expected.tolist())
-
-
-def test_a_finished_sweep_is_shown(sweep):
-    assert sweep(RUNS, "--no-figures")[0] == 0
-    before = contents(Path("results/sweep-my"))
-    status, out, _ = sweep(RUNS, "--no-figures")
-    assert status == 0
-    assert "already has these results" in out
-    assert contents(Path("results/sweep-my")) == before
-    status, out, err = sweep(RUNS.replace("shaping = [1, 0]", "shaping = [1, 2]"))
-    assert status == 2
-    assert "that this study lacks (task.rewards.shaping is [1, 0" in err
-
-
 def test_figures_are_added_to_finished_results_without_new_runs(sweep, monkeypatch):
     assert sweep(RUNS, "--no-figures")[0] == 0
     folder = Path("results/sweep-my")
@@ -176,59 +131,39 @@ def test_figures_are_added_to_finished_results_without_new_runs(sweep, monkeypat
     assert "already has these results" in sweep(RUNS, "--parquet")[1]
 
 
-WRONG = {
-    "no kind": ('kind = "runs"', "", ["kind is None", "runs, colony"]),
-    "no measure": (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
-    "unknown": ("shaping =", "shapings =", ["rewards.shapings` is not a setting; choose shaping"]),
-    "unknown key of the file": ("seeds =", "seds =", ["'seds' is not a setting", "choose seeds"]),
-    "other kind": ("rollouts", "ants", ["'ants' is not a setting of a sweep of kind 'runs'"]),
-    "missing": ("discount = 0.9", "", ["training.discount` is missing"]),
-    "value": ("discount = 0.9", "discount = 1.9", ["discount` is 1.9"]),
-    "twice": ("discount", "epsilon = 0.1\ndiscount", ["training.epsilon is in [vary]"]),
-    "empty": ("[1, 0]", "[]", ["task.rewards.shaping cannot vary, or has no values"]),
-    "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "or a list of seeds"]),
-    "per seed": (
+WRONG = [
+    ('kind = "runs"', "", ["kind is None", "runs, colony"]),
+    (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
+    ("shaping =", "shapings =", ["rewards.shapings` is not a setting; choose shaping"]),
+    ("seeds =", "seds =", ["'seds' is not a setting", "choose seeds"]),
+    ("rollouts", "ants", ["'ants' is not a setting of a sweep of kind 'runs'"]),
+    ("discount = 0.9", "", ["training.discount` is missing"]),
+    ("discount = 0.9", "discount = 1.9", ["discount` is 1.9"]),
+    ("discount", "epsilon = 0.1\ndiscount", ["training.epsilon is in [vary]"]),
+    ("[1, 0]", "[]", ["task.rewards.shaping cannot vary, or has no values"]),
+    ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "or a list of seeds"]),
+    (
         "[task]",
         "[world]\nper_seed = true\n[task]",
         ["per_seed is True", "for kind 'colony'"],
     ),
-    "for colonies": ("[vary]", "[vary]\ntask.life.regrowth = [1]", ["use a Colony"]),
-    "against": (
+    (
         "[task]",
         "[against]\ntask.rewards.shaping = 7\n[task]",
         ["against is task.rewards.shaping = 7; ", "[vary]"],
     ),
-    "margin alone": ("seeds =", "margin = 1\nseeds =", ["which margin requires"]),
-    "value twice": ("[1, 0]", "[1, 1]", ["task.rewards.shaping has 1 more than once"]),
-    "few episodes": ("episodes = 50", "episodes = 49", ["return_last50 needs 50 episodes"]),
-    "seed of one world": ("[task]", "[world]\nseed = 1\n[task]", ["world.seed has no effect on"]),
-    "no world": ("[task]", '[world]\npreset = "paprr"\nseed = 1\n[task]', ["did you mean paper?"]),
-    "a part twice": ("[task]", "[task]\nrewards = 3", ["in [vary], and task.rewards in"]),
-    "of the file": ("[vary]", "[vary]\nseeds = [3, 4]", ["seeds cannot vary"]),
-    "no toml": ("[vary]", "[vary", ["is not valid TOML", "correct it"]),
-    "preset": ("[task]", '[task]\npreset = "foragin"', ["task.preset is 'foragin'", "foraging"]),
-    "policy": ("seeds =", 'policy = "random"\nseeds =', ["episodes is 50", "set episodes = 0"]),
-    "no policy": ("episodes = 50", "episodes = 0", ["episodes is 0", "0 requires a policy"]),
-    "nothing varies": (RUNS[RUNS.index("[vary]") :], "", ["[vary] is missing"]),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_mistakes_in_a_file_end_in_one_sentence_that_names_the_key(name, sweep):
-    old, new, words = WRONG[name]
-    assert old in RUNS
-    status, out, err = sweep(RUNS.replace(old, new, 1))
-    assert (status, out) == (2, "")
-    assert_one_sentence(err)
-    assert "my.toml" in err
-    for word in words:
-        assert word in err
-    assert not Path("results").exists()
-
-
-def settings_of(text, tmp_path):
-    (tmp_path / "a.toml").write_text(text)
-    return plan({"file": tmp_path / "a.toml"}).settings
+    ("seeds =", "margin = 1\nseeds =", ["which margin requires"]),
+    ("[1, 0]", "[1, 1]", ["task.rewards.shaping has 1 more than once"]),
+    ("episodes = 50", "episodes = 49", ["return_last50 needs 50 episodes"]),
+    ("[task]", "[world]\nseed = 1\n[task]", ["world.seed has no effect on"]),
+    ("[task]", "[task]\nrewards = 3", ["in [vary], and task.rewards in"]),
+    ("[vary]", "[vary]\nseeds = [3, 4]", ["seeds cannot vary"]),
+    ("[vary]", "[vary", ["is not valid TOML", "correct it"]),
+    ("[task]", '[task]\npreset = "foragin"', ["task.preset is 'foragin'", "foraging"]),
+    ("seeds =", 'policy = "random"\nseeds =', ["episodes is 50", "set episodes = 0"]),
+    ("episodes = 50", "episodes = 0", ["episodes is 0", "0 requires a policy"]),
+    (RUNS[RUNS.index("[vary]") :], "", ["[vary] is missing"]),
+]
 
 
 def test_several_grids_are_joined(tmp_path):
@@ -243,7 +178,8 @@ training.learning_rate = 0.1
 training.planning_steps = [2, 4, 6]
 """
     head = RUNS[: RUNS.index("[vary]")].replace('learner = "sarsa"', "epsilon = 0.3")
-    settings = settings_of(head + grids, tmp_path)
+    (tmp_path / "a.toml").write_text(head + grids)
+    settings = plan({"file": tmp_path / "a.toml"}).settings
     names = ("training.learner", "training.learning_rate", "training.planning_steps")
     assert [tuple(one.get(name) for name in names) for one in settings] == [
         *(("q_learning", 0.1, None), ("q_learning", 0.2, None)),
@@ -350,19 +286,23 @@ def test_a_protocol_is_part_of_the_points_of_a_sweep(sweep, tmp_path):
     assert facts["protocol"][1][0]["at"]["remove_ants"] == {"share": 0.5}
 
 
-WRONG_EVENTS = {
-    "tick": ("tick = 20", "tick = 60", ["`at.tick` is 60, but episodes have 60 ticks"]),
-    "name": ("trail = 0", "trial = 0", ["in [[at]] number 1, `at.trial` is not a setting"]),
-    "measure": ('"living"', '"height"', ["in [[when]] number 1", "'height'"]),
-    "learning rate": (
+WRONG_EVENTS = [
+    ("tick = 20", "tick = 60", ["`at.tick` is 60, but episodes have 60 ticks"]),
+    ("trail = 0", "trial = 0", ["in [[at]] number 1, `at.trial` is not a setting"]),
+    ('"living"', '"height"', ["in [[when]] number 1", "'height'"]),
+    (
         "trail",
         "learning_rate",
         ["in [[at]] number 1, in the evaluation, the ants"],
     ),
-    "one table": ("[[every]]", "[every]", ["[every] must be [[every]]"]),
-    "number": ("at.1.remove", "at.2.remove", ["the file has no at.2; add it"]),
-    "kind": ('kind = "colony"', 'kind = "runs"', ["in a file of kind 'colony'"]),
-}
+    ("[[every]]", "[every]", ["[every] must be [[every]]"]),
+    ("at.1.remove", "at.2.remove", ["the file has no at.2; add it"]),
+    (
+        'kind = "colony"\nmeasures = "deliveries"',
+        'kind = "runs"\nmeasures = "greedy_deliveries"',
+        ["in a file of kind 'colony'"],
+    ),
+]
 
 
 def test_ranges_of_events_are_checked_and_whole(tmp_path):
@@ -379,16 +319,18 @@ def test_ranges_of_events_are_checked_and_whole(tmp_path):
             plan({"file": tmp_path / "my.toml"})
 
 
-@pytest.mark.parametrize("name", WRONG_EVENTS)
-def test_mistakes_in_events_end_in_one_sentence(name, sweep):
-    old, new, words = WRONG_EVENTS[name]
-    text = PROTOCOL.replace('"deliveries"', '"greedy_deliveries"') if name == "kind" else PROTOCOL
+@pytest.mark.parametrize(
+    ("text", "old", "new", "words"),
+    [(text, *row) for text, rows in ((RUNS, WRONG), (PROTOCOL, WRONG_EVENTS)) for row in rows],
+)
+def test_mistakes_in_a_file_end_in_one_sentence_that_names_the_key(text, old, new, words, sweep):
     assert old in text
     status, out, err = sweep(text.replace(old, new, 1))
     assert (status, out) == (2, "")
     assert_one_sentence(err)
-    for word in words:
+    for word in ("my.toml", *words):
         assert word in err
+    assert not Path("results").exists()
 
 
 def test_settings_of_a_training_that_does_not_happen_are_refused():

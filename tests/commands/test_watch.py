@@ -7,11 +7,10 @@ import signal
 import sys
 import time
 import urllib.request
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from command_lines import call, load, promptly, run, start
+from command_lines import call, load, promptly, start
 
 from taichi_ants import AntsError
 from taichi_ants.live import server
@@ -35,25 +34,6 @@ def test_ctrl_c_ends_it_promptly_in_one_line(kernels: Path, tmp_path: Path) -> N
     assert process.returncode == 130
     assert said == "Stopped.\n"
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.slow
-def test_ctrl_c_ends_the_replay_of_a_session(kernels: Path, tmp_path: Path) -> None:
-    log = Session(Choices({}).setup(load("watch").START)).log()
-    replace(log, steps=10**9, ticks=10**9).write(tmp_path / "endless.npz")
-    # Compiles some kernels.
-    assert run("watch", ["--duration", 1], kernels, tmp_path).returncode == 0
-    with start("watch", ["--session", tmp_path / "endless.npz"], kernels, tmp_path) as process:
-        try:
-            time.sleep(3)
-            assert process.poll() is None
-            began = time.monotonic()
-            process.send_signal(signal.SIGINT)
-            printed, said = process.communicate(timeout=30)
-            assert time.monotonic() - began < promptly()
-        finally:
-            process.kill()
-    assert (process.returncode, printed, said) == (130, "", "Stopped.\n")
 
 
 def test_the_first_session_delivers_and_runs(

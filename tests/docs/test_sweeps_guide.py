@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from command_lines import ROOT
 
-from taichi_ants import Colony, TrainingConfig, files, worlds
-from taichi_ants.learners.policies import frozen_policy
+from taichi_ants import files
 from taichi_ants.studies.store import Store
 from taichi_ants.studies.study import run
 from taichi_ants.studies.sweep import sweep_of
-from taichi_ants.task import foraging
 
 GUIDE = (ROOT / "docs/how-to/sweeps.md").read_text("utf-8")
 COLONY, RUNS = (part.split("```")[0] for part in GUIDE.split("```python\n")[1:])
@@ -49,18 +46,3 @@ def test_the_row_of_a_lone_ant_is_the_one_of_the_guide(tmp_path, capsys):
     printed = [float(one) for one in capsys.readouterr().out.split()]
     assert printed == [wanted[name] for name in file["measures"]]
     assert found["trace"].rewards.sum() == found["greedy"].returns.ravel()[0]
-
-
-@pytest.mark.parametrize("epsilon", [None, 0.05])
-def test_the_row_of_a_frozen_policy_is_played_as_the_guide_says(epsilon, tmp_path):
-    more = {} if epsilon is None else {"evaluation_epsilon": epsilon}
-    names = {"kind": "colony", "measures": ["deliveries", "entropy"], "task.preset": "foraging"}
-    of_colony = {"ants": 9, "episodes": 0, "ticks": 200, "rollouts": 2, "seeds": [5]}
-    vary = {"policy": ["trail_follower"]}
-    wanted = row_of({**names, **of_colony, **more, "vary": vary}, tmp_path)
-    policy = {"sharing": "frozen", "q_values": frozen_policy("trail_follower", "ants")}
-    who = TrainingConfig.frozen(epsilon or 0), 5 + 2**32
-    colony = Colony(worlds.paper(), foraging(), *who, ants=9, **policy)
-    rollouts = colony.run(2, 200, measures="entropy")
-    assert rollouts.deliveries.mean() * 1000 / 200 == wanted["deliveries"] > 0
-    assert np.mean(rollouts.series.values["entropy.trail"]) == wanted["entropy.trail"]

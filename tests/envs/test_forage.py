@@ -19,8 +19,6 @@ from taichi_ants import AntsError, Pheromone, Task, World, task, worlds
 from taichi_ants.envs import Event, Reason
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
 from taichi_ants.envs.formats import FORMATS
-from taichi_ants.learners.policies import trail_follower
-from taichi_ants.task.constants import FOOD
 
 ID = "taichi_ants/HexForage-v0"
 SMALL = [worlds.open_world(seed, (8, 8, 8)) for seed in range(3)]
@@ -98,7 +96,7 @@ def test_infos_have_the_same_numbers_after_each_reset_and_step():
     _, info = env.reset(seed=0)
     codes = [(info["event"], info["reason"])]
     for action in (3, 4, 1, 1, 3, 3, 4, 1, 1, 4):
-        *_, info = env.step(action)
+        *_, terminated, truncated, info = env.step(action)
         assert {name: type(value) for name, value in info.items()} == kinds
         codes.append((info["event"], info["reason"]))
     assert codes == [
@@ -114,6 +112,7 @@ def test_infos_have_the_same_numbers_after_each_reset_and_step():
         (Event.BLOCKED, Reason.QUEEN_AHEAD),
         (Event.DELIVERED, Reason.NONE),
     ]
+    assert (terminated, truncated) == (True, False)
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
@@ -201,37 +200,6 @@ def test_wrong_arguments_are_named(arguments, told):
         assert told in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("delivery", "ends"),
-    [
-        ("terminates", (True, False)),
-        ("truncates", (False, True)),
-        ("continues", (False, False)),
-        (None, (False, True)),  # as the task says
-    ],
-)
-def test_a_delivery_ends_an_episode_as_is_asked_for(delivery, ends):
-    q_values, rng = trail_follower(), np.random.default_rng(0)
-    rules, foods = Task(delivery="truncates"), len(worlds.paper().foods)
-    env = gymnasium.make(ID, task=rules, delivery=delivery)
-    _, info = env.reset(seed=0)
-    delivered = 0
-    for step in range(600):
-        values = q_values[info["state"]]
-        action = rng.choice(np.flatnonzero(values == values.max()))
-        _, _, *ended, info = env.step(int(action))
-        if info["event"] == Event.DELIVERED:
-            delivered += 1
-            assert tuple(ended) == ends
-        elif step < 599:
-            assert not any(ended)
-        if any(ended):
-            break
-    assert delivered >= (3 if delivery == "continues" else 1)
-    left = env.unwrapped._ants.batched.snapshot(0).ground == FOOD
-    assert left.sum() == (foods if delivery == "continues" else foods - 1)
-
-
 MAZE = [1] * 16 + [3] + [1] * 16 + [4]  # delivers in the paper's world
 
 
@@ -267,4 +235,6 @@ def test_worlds_and_tasks_by_name_path_and_value(tmp_path) -> None:
 
     for same in ({"world": path}, {"world": str(path)}, {"task": "paper"}, {"task": task.paper()}):
         assert played(**same) == played()
+    truncates = Task(delivery="truncates")
+    assert played(task=truncates) == played(delivery="truncates") != played()
     assert played(task="fetching") == played(task=task.fetching()) != played()

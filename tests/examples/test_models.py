@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import runpy
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from command_lines import ROOT, numbers_in, run
+from command_lines import ROOT, numbers_in
 from model_script import table
 
 from taichi_ants.analysis.statistics import bootstrap_interval
@@ -79,10 +78,8 @@ def test_a_colony_recovers_after_a_removal(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_no_entry_pheromone(kernels: Path, tmp_path: Path) -> None:
-    done = run("models/no_entry", ["--seeds", 2, "--out", tmp_path], kernels, tmp_path)
-    assert done.returncode == 0, done.stderr
-    rows = numbers_in(tmp_path / "no_entry.csv")
+def test_a_no_entry_pheromone(tmp_path, monkeypatch, rules_of_scripts):
+    rows = rows_of("no_entry", 2, tmp_path, monkeypatch)
     assert len(rows) == 2 * 4 * 2 * 30
     last = [row["delivered"] for row in rows if row["tick"] == 3000]
     assert min(last) > 0

@@ -154,21 +154,6 @@ def test_below_ten_seeds_no_difference_has_a_verdict(seeds: int, verdict: Verdic
     assert (verdicts_of(judged) == {Verdict.TOO_FEW}) == (seeds < 10)
 
 
-def test_seeds_are_paired() -> None:
-    """What a seed adds to all conditions alike does not blur their difference."""
-    study = build(noise=50)  # every condition draws noise of its own
-    base = next(iter(study.values()))["deliveries"]
-    for condition, measures in study.items():
-        gain = 1.02 if condition.rules == ABC else 1.0
-        measures["deliveries"] = base * condition.ants * gain
-    (findings,) = [
-        findings
-        for (_, series), findings in judge_all(study).items()
-        if (series.first, series.second) == (Trained(ABC), Trained(PAPER))
-    ]
-    assert {finding.verdict for finding in findings.values()} == {Verdict.SUPPORTED}
-
-
 def test_the_table_of_differences_holds_what_verdicts_rest_on() -> None:
     study = build(lambda rules, regime, ants: 20.0 * ants * (2 if rules == ABC else 1))
     judged = judge_all(study)

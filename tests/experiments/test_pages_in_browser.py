@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from browser import printed, shares, started
+from browser import Page, printed, shares
 from finished_pages import colony_html, comparison_html, results
 from paper.claims import claims_rows
 
 pytestmark = pytest.mark.browser
 
 VERDICTS = ["supported", "equivalent", "undecided", "contradicted", "not tested"]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with started() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")
@@ -26,29 +20,24 @@ def paths(tmp_path_factory):
     return folder
 
 
+class Report(Page):
+    """A page of results."""
+
+    ready = "window.report"
+
+
 @pytest.fixture
 def opened(browser, paths):
-    """Opens a page; at the end nothing must have gone wrong, and nothing was asked for."""
-    faults, contexts = [], []
+    """Opens a page without a network; at the end nothing must have gone wrong."""
+    pages = []
 
     def show(name: str, width: int = 1280, **options):
-        # The page allows no evaluation of text, which is how Playwright waits.
-        usual = {"viewport": {"width": width, "height": 800}, "bypass_csp": True, "offline": True}
-        context = browser.new_context(**usual, **options)
-        contexts.append(context)
-        tab = context.new_page()
-        tab.on("console", lambda message: faults.append(message.text))
-        tab.on("pageerror", lambda error: faults.append(str(error)))
-        address = (paths / f"{name}.html").as_uri()
-        tab.on("request", lambda one: faults.append(one.url) if own(one.url, address) else None)
-        tab.goto(address)
-        tab.wait_for_function("window.report")
-        return tab
+        pages.append(Report(browser, paths / f"{name}.html", (width, 800), **options))
+        return pages[-1].tab
 
     yield show
-    for context in contexts:
-        context.close()
-    assert faults == []
+    for page in pages:
+        page.close()
 
 
 @pytest.mark.parametrize("name", ["comparison", "colony"])
@@ -63,11 +52,6 @@ def test_the_page_works_under_its_policy(browser, paths, name):
     assert tab.evaluate("getComputedStyle(document.body).margin") == "0px"
     context.close()
     assert faults == []
-
-
-def own(url: str, address: str) -> bool:
-    """Whether a request leaves the file."""
-    return url.partition("#")[0] != address and not url.startswith("data:")
 
 
 def shown(tab) -> list[list[str]]:
@@ -152,20 +136,12 @@ def test_details_open_one_by_one_or_at_once_and_stay_on_paper(opened):
     assert not any(one.is_visible() for one in told.all())
 
 
-def test_one_player_at_a_time(opened):
-    tab = opened("comparison")
-    for number in (0, 1):
-        tab.locator(".player button").nth(number).click()
-    assert tab.evaluate("report.players.map((one) => one.player.playing)") == [False, True]
-
-
 PIXELS = """number => [...document.querySelectorAll(".player")[number].querySelectorAll("canvas")]
   .map((one) => one.toDataURL())"""
 
 
-@pytest.mark.parametrize(("name", "last"), [("comparison", 34), ("colony", 30)])
-def test_players_play(opened, name, last):
-    tab = opened(name)
+def test_players_play(opened):
+    tab, last = opened("comparison"), 34
     player = tab.locator(".player").first
     assert player.locator("output").inner_text() == f"{last // 2} / {last}"  # something goes on
     player.locator("button").click()
@@ -190,6 +166,9 @@ def test_players_play(opened, name, last):
     tab.wait_for_function("!report.players[0].player.playing")
     assert tab.evaluate("report.players[0].player.moment") == last
     assert tab.evaluate(PIXELS, 0) == end
+    for number in (0, 1):  # one at a time
+        tab.locator(".player button").nth(number).click()
+    assert tab.evaluate("report.players.map((one) => one.player.playing)") == [False, True]
 
 
 @pytest.mark.parametrize("name", ["comparison", "colony"])

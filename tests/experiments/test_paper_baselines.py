@@ -8,36 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from paper.baselines import bound_rows, policy_rows
-from plain_runs import rollout
 
+from taichi_ants import evaluate
 from taichi_ants.analysis import bounds as exact_bounds
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Rewards, Task
 from taichi_ants.worlds import paper
 from taichi_ants.worlds.world import World
-
-
-def evaluate(world: World, q_values: np.ndarray, **options: Any) -> SimpleNamespace:
-    """Rollouts of the reference, in the form of the engine's."""
-    rollouts = [
-        [
-            rollout(
-                world,
-                table,
-                seed=seed,
-                number=number,
-                max_steps=options["max_steps"],
-                task=options["task"],
-            )
-            for number in range(options["rollouts"])
-        ]
-        for table, seed in zip(q_values, options["seeds"], strict=True)
-    ]
-    return SimpleNamespace(
-        returns=np.array([[r.returns[0] for r in row] for row in rollouts]),
-        steps=np.array([[r.steps[0] for r in row] for row in rollouts]),
-        deliveries=np.array([[r.deliveries[0] for r in row] for row in rollouts]),
-    )
 
 
 def test_the_rows_of_the_world_of_the_paper() -> None:

@@ -19,7 +19,6 @@ from paper.comparison import (
 from synthetic_comparison import Edit, build, change, level_truth, remeasured, unchanged
 
 from taichi_ants.analysis.findings import (
-    SIMULTANEOUS_LEVEL,
     Criterion,
     Finding,
     Verdict,
@@ -198,31 +197,6 @@ def test_seeds_pair_the_rows() -> None:
     blurred = only(unpaired, "sarsa-return-slightly-lower")
     assert blurred.by_mean.effect == pytest.approx(paired.by_mean.effect)
     assert blurred.verdict is Verdict.UNDECIDED
-
-
-def test_a_finding_shows_the_weakest_contrast_and_what_it_rests_on() -> None:
-    comparison = build({"truncates": unchanged, "terminates": P3_HIGH})
-    true = only(comparison, "q-return-highest")
-    false = only(comparison, "q-return-highest", "terminates")
-    # Returns at the configurations of table 2: 52, SARSA 43, p3 45, p5 48.6.
-    assert true.contrast.label == "Q-learning minus Dyna-Q (p5)"
-    assert true.effect == pytest.approx(3.4, abs=0.2)
-    assert false.contrast.label == "Q-learning minus Dyna-Q (p3)"
-    assert false.effect == pytest.approx(-13, abs=0.2)
-    assert true.contrast.seeds == 16
-    assert true.low < true.effect < true.high
-    assert only(build({"truncates": unchanged}), "dyna-below-q-peak").contrast.seeds == 8
-
-
-def test_levels_are_corrected_for_all_intervals_of_all_tested_claims() -> None:
-    claims = [BY_ID["q-return-highest"], BY_ID["discount-q"], BY_ID["greedy-return"]]
-    comparison = build({"truncates": unchanged, "terminates": unchanged})
-    intervals = 2 * (3 + 1 + 4)  # of the IQM and of the mean
-    for findings in assess(comparison, claims).values():
-        for one in findings.values():
-            assert one.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * intervals))
-    shares = only(comparison, "overall-improvement-reliable")
-    assert shares.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 4))
 
 
 def test_the_tables_hold_the_findings() -> None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from paper.comparison import FIGURE_1, Q_LEARNING, SARSA
+from paper.comparison import Q_LEARNING, SARSA
 from paper.quantities import (
     READS,
     ContrastOfEstimates,
@@ -15,31 +13,11 @@ from paper.quantities import (
     rank_correlation,
     share_above,
 )
-from synthetic_comparison import build, remeasured, subset, unchanged
+from synthetic_comparison import build, remeasured, unchanged
 
 from taichi_ants.analysis.findings import above, judge
-from taichi_ants.analysis.statistics import bootstrap_interval
 
 AT_FIGURE_1, MEAN_OF_ALL = READS["at figure 1"], READS["mean of all"]
-
-
-def test_what_is_missing_is_nan() -> None:
-    comparison = build({"truncates": unchanged}, seeds=2, variants=[SARSA], grid=[FIGURE_1])
-    part = grids_of(comparison, "truncates")
-    assert np.isfinite(AT_FIGURE_1.values(part, "return_last50", SARSA)).all()
-    assert np.isnan(MEAN_OF_ALL.values(part, "return_last50", SARSA)).all()
-    for missing in (
-        grids_of(comparison, "terminates"),
-        grids_of(replace(comparison, world="garden.txt"), "truncates"),
-        grids_of(subset(comparison, [0], 2, 49), "truncates"),
-    ):
-        assert np.isnan(AT_FIGURE_1.values(missing, "return_last50", SARSA)).all()
-    for quantity in (
-        share_above("return_last50", Q_LEARNING, SARSA),
-        rank_correlation("return_last50", "steps_all", SARSA),
-    ):
-        (effect,) = quantity.effects.values()
-        assert np.isnan(effect(part)).all()
 
 
 def test_the_held_out_half_does_not_choose() -> None:
@@ -111,12 +89,3 @@ def test_jackknife_values_remove_the_bias_of_noise() -> None:
 
 def variance(means: np.ndarray) -> np.ndarray:
     return means.var(axis=0, ddof=1)
-
-
-def test_the_interval_of_jackknife_values_covers_the_statistic() -> None:
-    """Three true means with variance 1, 30 seeds of noise."""
-    noise = np.random.default_rng(4).normal(0, 1, size=(1500, 3, 30))
-    samples = noise + np.array([-1.0, 0.0, 1.0])[:, None]
-    values = np.stack([jackknife_values(variance, sample) for sample in samples])
-    low, high = bootstrap_interval(values, resamples=2000)
-    assert 0.92 < np.mean((low <= 1.0) & (high >= 1.0)) < 0.98

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from browser import Page, started
+from browser import Page
 
 from taichi_ants import runtime
 
@@ -37,11 +37,10 @@ class Article(Page):
 
 
 @pytest.fixture
-def opened():
-    with started() as browser:
-        pages = []
-        yield lambda *size, **options: pages.append(Article(browser, *size, **options)) or pages[-1]
-        pages[0].close()
+def opened(browser):
+    pages = []
+    yield lambda *size, **options: pages.append(Article(browser, *size, **options)) or pages[-1]
+    pages[0].close()
 
 
 @pytest.mark.browser

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-from browser import Page, started
+from browser import Page
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILE = DOCS / "lessons.html"
@@ -15,12 +15,6 @@ FILE = DOCS / "lessons.html"
 SAME = ("markov", "sweep", "values", "update", "wrong", "planning", "opens", "two", "practice")
 FUNCTION = "function qLearning(q, s, a, r, sNext, terminated, alpha, gamma) { %s }"
 PLAIN = "q[s][a] += alpha * (r + %s * Math.max(...q[sNext]) - q[s][a]);"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with started() as one:
-        yield one
 
 
 class Lessons(Page):

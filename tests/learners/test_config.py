@@ -33,21 +33,11 @@ def test_rates_fall_by_their_factors_down_to_their_least():
 @pytest.mark.parametrize(
     ("learner", "name", "value", "says"),
     [
-        (
-            "q_learning",
-            "planning_steps",
-            3,
-            "is not a setting of q_learning",
-        ),
+        ("q_learning", "planning_steps", 3, "is not a setting of q_learning"),
         ("dyna_q", "planning_steps", 2.0, "`training.planning_steps` is 2.0; it must be a whole"),
         ("dyna_q", "planning_steps", "3", "`training.planning_steps` is '3'; it must be a whole"),
         ("dyna_q", "planning_steps", True, "`training.planning_steps` is True; it must be a whole"),
-        (
-            "dyna_q",
-            "trace_decay",
-            0.5,
-            "is not a setting of dyna_q; choose one of",
-        ),
+        ("dyna_q", "trace_decay", 0.5, "is not a setting of dyna_q; choose one of"),
         ("td_zero", "n_steps", 3, "there is no learner 'td_zero'; choose one of q_learning, "),
     ],
 )
@@ -60,14 +50,8 @@ def test_hyperparameters_are_those_of_the_learner(learner, name, value, says):
 
 def test_numbers_of_any_kind_are_stored_as_plain_ones():
     plain = TrainingConfig(**{**GOOD, "discount": 0.5, "epsilon": 1})
-    other = TrainingConfig(
-        **{
-            **GOOD,
-            "discount": Fraction(1, 2),
-            "epsilon": np.float32(1),
-            "planning_steps": np.int8(3),
-        }
-    )
+    numbers = {"discount": Fraction(1, 2), "epsilon": np.float32(1), "planning_steps": np.int8(3)}
+    other = TrainingConfig(**{**GOOD, **numbers})
     assert plain == other
     assert hash(plain) == hash(other)
     assert asdict(plain) == asdict(other)

@@ -11,14 +11,7 @@ import pytest
 import taichi as ti
 from command_lines import ROOT, environment
 
-from taichi_ants import (
-    AntsError,
-    Colony,
-    TrainingConfig,
-    continue_training,
-    trace_training,
-    train,
-)
+from taichi_ants import AntsError, Colony, TrainingConfig, continue_training, trace_training, train
 from taichi_ants.learners import (
     Hyperparameters,
     Learner,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Page, started
+from browser import Page
 from rooms import CHOSEN, Guest, running
 
 from taichi_ants import Colony, load_policy
@@ -26,12 +26,6 @@ WORLD = """() => {
            loaded: frame.poses.reduce((sum, pose) => sum + (pose >> 3 & 1), 0),
            tick: frame.tick, deliveries: frame.deliveries };
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with started() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")
@@ -312,7 +306,7 @@ def test_the_token_is_seen_in_no_command_line_and_no_address(browser, room, monk
 def test_files_are_saved_and_loaded(page, room, tmp_path):
     page.press("Shift+ArrowRight")
     wait(page, "viewer.history.frames.at(-1).tick === 10")
-    for kind in ("session", "page", "gif", "policy", "colony"):
+    for kind in ("session", "gif", "policy", "colony"):
         with page.tab.expect_download() as got:
             page.tab.click(f'[data-export="{kind}"]')
         got.value.save_as(tmp_path / got.value.suggested_filename)
@@ -385,6 +379,3 @@ def test_every_control_is_reached_by_keyboard_and_has_a_name(page):
         assert control in reached
     del reached["BODY"]
     assert [name for name, good in reached.items() if not good] == []
-
-
-# Elements beyond the sides of their card, and words that do not fit into their button or label.

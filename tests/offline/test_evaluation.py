@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import plain_offline as plain
 import pytest
-from plain_data import behaviour_of, episodes_of, random_data
+from plain_offline import behaviour_of, episodes_of, random_data
 from random_worlds import random_world
 
-from taichi_ants import AntsError, Task, record, worlds
+from taichi_ants import Task, record, worlds
 from taichi_ants.learners.policies import action_probabilities
 from taichi_ants.offline.evaluation import importance_sampling, model_based
 from taichi_ants.offline.learners import tolerance
@@ -58,18 +56,3 @@ def test_an_interval_covers_the_truth_about_as_often_as_it_says():
         found = importance_sampling(data, table, 0.9, 0.5)
         covered += bool(found.low <= truth <= found.high)
     assert covered >= 33
-
-
-def test_what_cannot_be_judged():
-    data = random_data(worlds.paper(), 6)
-    table = np.zeros((128, 5))
-    unknown = replace(data, behaviour_probability=np.full(len(data), np.nan))
-    with pytest.raises(AntsError, match="behaviour_probability of the data contains nan"):
-        importance_sampling(unknown, table)
-    assert np.isfinite(model_based(unknown, table).value)
-    with pytest.raises(AntsError, match="q_values has shape"):
-        model_based(data, np.zeros((3, 5)))
-    with pytest.raises(AntsError, match="`discount` is 1"):
-        model_based(data, table, 1.0)
-    with pytest.raises(AntsError, match="`resamples` is -1"):
-        importance_sampling(data, table, resamples=-1)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import plain_offline as plain
 import pytest
-from plain_data import episodes_of, random_data
+from plain_offline import episodes_of, random_data
 from random_worlds import random_world
 
 from taichi_ants import (
-    AntsError,
     Dataset,
     Task,
     TrainingConfig,
@@ -28,8 +27,6 @@ from taichi_ants.offline.learners import (
     pessimistic_q_iteration,
     tolerance,
 )
-
-LEARNERS = (batch_q_learning, fitted_q_iteration, pessimistic_q_iteration)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -119,11 +116,3 @@ def test_one_sweep_over_a_learners_history_is_what_it_learned_online():
     data = record(worlds.paper(), config, 30, range(3))
     offline = batch_q_learning(data, 0.9, 0.1, sweeps=1, by_run=True)
     assert np.array_equal(offline, train(worlds.paper(), config, range(3), 30).q_values[0])
-
-
-@pytest.mark.parametrize("learn", LEARNERS)
-@pytest.mark.parametrize("given", [{"discount": 1.5}, {"data": 3}])
-def test_what_cannot_be_learned_from(learn, given):
-    data = given.get("data", by_hand(CHAIN))
-    with pytest.raises(AntsError, match=next(iter(given))):
-        learn(data, given.get("discount", 0.9))

@@ -8,7 +8,6 @@ from plain_runs import run_episode, train_with_tables
 from random_worlds import random_world
 
 from taichi_ants import (
-    AntsError,
     Colony,
     Life,
     Task,
@@ -120,17 +119,3 @@ def test_ants_of_a_colony_that_appear_and_die(learner, sharing, delivery, life):
     assert data.step[data.begins[:-1]].max() > 0  # some appear while others live
     assert data.terminated.any() == (delivery == "terminates")
     assert len(lives) > 20
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"behaviour": np.zeros((3, 128, 5))}, "behaviour has shape"),
-        ({"behaviour": np.zeros((128, 4))}, "q_values has shape"),
-        ({"episodes": 0}, "episodes is 0"),
-        ({"epsilon": 2}, "epsilon is 2"),
-    ],
-)
-def test_what_cannot_be_recorded(change, says):
-    with pytest.raises(AntsError, match=says):
-        record(**{"world": worlds.paper(), "seeds": (1, 2), **change})

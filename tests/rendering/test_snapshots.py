@@ -27,38 +27,26 @@ def check(world: World, seed: int, evaporation: bool, epsilon: float) -> None:
     assert episode.trace == trace
     snapshots = list(episode.snapshots())
     assert len(snapshots) == len(trace) + 1
-
     colony = follower(world, table, seed, 0, task, epsilon)
     colony.begin_episode()
     existing = list(colony.world.ground)
     index = world.grid.index(np.array(existing))
-    for step, (snapshot, status) in enumerate(snapshots):
+    for snapshot, status in snapshots:
         ant = colony.ants[0]
         assert snapshot.ground[index].tolist() == [colony.world.ground[cell] for cell in existing]
-        assert snapshot.trail[index].tolist() == [
-            colony.world.trail.level(cell) for cell in existing
-        ]
+        levels = [colony.world.trail.level(cell) for cell in existing]
+        assert snapshot.trail[index].tolist() == levels
         assert snapshot.ant_cells[0] == world.grid.index(normal_form(ant.cell))
         assert snapshot.ant_headings[0] == ant.heading
         assert snapshot.ant_carries[0] == ant.carries
         assert status.state == ant.state
-        if step == len(trace):
-            break
-        assert snapshot.ant_cells[0] == world.grid.index(trace.cells[step])
-        assert snapshot.ant_headings[0] == trace.headings[step]
-        colony.tick()
-        assert colony.transitions[0].action == trace.actions[step]
+        if not colony.over:
+            colony.tick()
 
 
-@pytest.mark.parametrize("evaporation", [True, False])
-def test_the_paper_world(evaporation) -> None:
-    check(paper(), 0, evaporation, 0.0)
-    check(paper(), 1, evaporation, 0.6)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_random_worlds(seed) -> None:
-    check(random_world(seed), seed, bool(seed % 2), 0.4)
+@pytest.mark.parametrize("seed", range(8))
+def test_snapshots_of_an_episode_are_the_worlds_of_the_reference(seed) -> None:
+    check(paper() if seed > 5 else random_world(seed), seed, bool(seed % 2), 0.6 * (seed % 4 > 0))
 
 
 def test_what_the_lines_say() -> None:

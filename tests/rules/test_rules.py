@@ -94,114 +94,40 @@ def test_pick_draws_by_weights_and_never_what_is_closed(clean):
     assert abs(drawn[2] - 7500) < 5 * np.sqrt(10_000 * 0.75 * 0.25)
 
 
-# The kind of a rule, words of the message, and the rule.
-WRONG = r"""
-evaporation: its last line, and no other, must be a return
-def wrong(level):
-    level = level + 1
-
-evaporation: line 2 of it, `while level >= 0:
-def wrong(level):
-    while level >= 0:
-        level = level + 1
-    return level
-
-evaporation: must have literal whole numbers
-def wrong(level):
-    for _ in range(10**9):
-        level = level + 1
-    return level
-
-evaporation: it returns nan
-def wrong(level):
-    return level * 1e308 * 1e308 * 0
-
-evaporation: a number from 0 to 1000000000
-def wrong(level):
-    return level - 300
-
-evaporation: has the argument `levl`, which is not an input
-def wrong(levl):
-    return levl
-
-evaporation: `'level'`, is not a number
-def wrong(level):
-    return "level" if level else 0
-
-evaporation: ZeroDivisionError: float division by zero for level=
-def wrong(level):
-    return 1 / (level - level)
-
-evaporation: `nowhere`, is not defined
-def wrong(level):
-    return level + nowhere
-
-evaporation: `not level`, is not a number; use it as a condition, as in
-def wrong(level):
-    return 1 - (not level)
-
-choice: is a vector; use its entries
-def wrong(levels):
-    return levels
-
-choice: must have an index from 0 to 2
-def wrong(levels):
-    return levels[3]
-
-evaporation: `level ** 2`, is not allowed; write power(x, y), of
-def wrong(level):
-    return level**2
-
-choice: an action, a whole number from 0 to 4
-def wrong(random):
-    return random * 4
-
-deposit: `level`, is not a vector, for example `[0.2 * k for
-def wrong(level):
-    return pick(level, 0.5)
-
-deposit: `weights = [level, 1, 2]`, must have 2 entries, as before
-def wrong(level):
-    weights = [level, 1]
-    weights = [level, 1, 2]
-    return 1 + pick(weights, 0.5)
-
-choice: `weights[1]`, is not allowed; assign to one name at a time
-def wrong(random):
-    weights = [1, 1, 1]
-    weights[1] = 0
-    return pick(weights, random)
-
-choice: repeats 257 times; at most 256 are allowed
-def wrong(random):
-    return min(pick([1 for _i in range(257)], random), 4)
-
-choice: it returns -1 for is_open=(0.0, 0.0, 0.0), random=
-def wrong(is_open, random):
-    return pick(is_open, random)
-
-deposit: has the argument `*level`, which is not an input
-def wrong(*level):
-    return 0
-
-deposit: `word: str = 'x'`, which is not an input of the kind
-def wrong(level, amount: float = -1.0, word: str = "x"):
-    return level
-
-evaporation: is used outside its loop
-def wrong(level):
-    for i in range(3):
-        level = level + i
-    return i
-""".strip().split("\n\n")
+# The kind and the inputs of a rule, its lines, with "|" between them, and words of the message.
+WRONG = """
+evaporation(level): level = level + 1 => its last line, and no other, must be a return
+evaporation(level): while level >= 0:|    level = 1|return 0 => line 2 of it, `while level >= 0:
+evaporation(level): for _ in range(10**9):|    level = 1|return 0 => must have literal whole numbers
+evaporation(level): return level * 1e308 * 1e308 * 0 => it returns nan
+evaporation(level): return level - 300 => a number from 0 to 1000000000
+evaporation(levl): return levl => has the argument `levl`, which is not an input
+evaporation(level): return "level" if level else 0 => `'level'`, is not a number
+evaporation(level): return 1 / (level - level) => ZeroDivisionError: float division by zero for lev
+evaporation(level): return level + nowhere => `nowhere`, is not defined
+evaporation(level): return 1 - (not level) => `not level`, is not a number; use it as a condition, a
+choice(levels): return levels => is a vector; use its entries
+choice(levels): return levels[3] => must have an index from 0 to 2
+evaporation(level): return level**2 => `level ** 2`, is not allowed; write power(x, y), of
+choice(random): return random * 4 => an action, a whole number from 0 to 4
+deposit(level): return pick(level, 0.5) => `level`, is not a vector, for example `[0.2 * k for
+deposit(level): a = [level, 1]|a = [1, 1, 2]|return pick(a, 0.5) => must have 2 entries, as before
+choice(random): a = [1, 1]|a[1] = 0|return 1 => `a[1]`, is not allowed; assign to one name at a time
+choice(random): return pick([1 for _i in range(257)], random) => 257 times; at most 256 are allowed
+choice(is_open, random): return pick(is_open, random) => returns -1 for is_open=(0.0, 0.0, 0.0), ra
+deposit(*level): return 0 => has the argument `*level`, which is not an input
+deposit(level, word: str = 'x'): return level => `word: str = 'x'`, which is not an input of
+evaporation(level): for i in range(3):|    level = level + i|return i => is used outside its loop
+""".strip().splitlines()
 
 
-@pytest.mark.parametrize("case", WRONG, ids=[case.partition("\n")[0] for case in WRONG])
+@pytest.mark.parametrize("case", WRONG)
 def test_wrong_rules_are_refused_in_one_sentence(case, clean, tmp_path):
-    head, _, source = case.partition("\n")
-    kind, _, says = head.partition(": ")
+    rule, says = case.split(" => ")
+    kind, rest = rule.split("(", 1)
+    source = f"def wrong({rest}".replace("): ", "):|", 1).replace("|", "\n    ")
     path = tmp_path / "wrong.py"
-    path.write_text(f"from taichi_ants.rules import pick, power\n\n\n{source}\n")
+    path.write_text(f"from taichi_ants.rules import pick\n\n\n{source}\n")
     function = runpy.run_path(str(path))["wrong"]
     with pytest.raises(AntsError) as caught:
         rules.register(kind)(function)

@@ -11,98 +11,58 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plain_interventions import Protocol
 from random_castes import drawn_castes
 from random_choices import NOISE
 from random_colonies import RandomColony, random_colony, with_nests
 from random_protocols import random_protocol
-from same_colonies import assert_equal
+from same_colonies import every_tick_of_protocol
 
 from taichi_ants import AntsError, Colony
-from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.protocol import ProtocolEvent
 from taichi_ants.reference import ReferenceColony
 
-TICKS, EPISODES = 50, 2
+TICKS = 50
 TRAIL = {"evaporation": "power_law", "half_life": None, "deposit": "weaker", "cap": None}
 TRAIL |= {"level": 250, "slope": None}
 ALARM = {"deposit": "alarm", "level": 250, "cap": None, "slope": None}
-# By name: arguments of `random_colony`; nests, kinds of food, loads; castes, labour, their cues;
-# and changes of the task.
+# By name: learner, sharing, traffic, dense, fields, and more arguments of `random_colony`; nests,
+# kinds of food, loads; castes, labour, their cues; and changes of the task.
 MODELS = {
     "softmax": (
-        {
-            **{"learner": "sarsa", "sharing": "shared", "traffic": "right_of_way"},
-            **{"dense": False, "fields": "ab", "cues": ("a", "b"), "choice": "softmax"},
-        },
-        (2, 2, True),
-        (2, True, None),
-        {},
-    ),
+        ("sarsa", "shared", "right_of_way", False, "ab", {"cues": ("a", "b"), "choice": "softmax"}),
+        (2, 2, True), (2, True, None), {}),
     "deneubourg": (
-        {
-            **{"learner": "q_learning", "sharing": "frozen", "traffic": "following"},
-            **{"dense": False, "fields": "aB", "choice": "deneubourg", "view": "strongest"},
-        },
-        (2, 1, False),
-        (2, True, [("trail", "compass"), ("a", "B")]),
-        {},
-    ),
+        ("q_learning", "frozen", "following", False, "aB",
+         {"choice": "deneubourg", "view": "strongest"}),
+        (2, 1, False), (2, True, [("trail", "compass"), ("a", "B")]), {}),
     "rules of users": (
-        {"learner": "q_learning", "sharing": "frozen", "traffic": "following", "dense": True},
-        (2, 2, False),
-        (2, True, None),
-        {"choice": "weber", "pheromone": TRAIL},
-    ),
+        ("q_learning", "frozen", "following", True, "", {}),
+        (2, 2, False), (2, True, None), {"choice": "weber", "pheromone": TRAIL}),
     "rewards of users": (
-        {
-            **{"learner": "sarsa", "sharing": "shared", "dense": False, "fields": "B"},
-            **{"traffic": "right_of_way"},
-        },
-        (3, 2, True),
-        (2, True, None),
-        {"choice": "restless", "reward": "shaped", "fields": {"B": {"evaporation": "power_law"}}},
-    ),
+        ("sarsa", "shared", "right_of_way", False, "B", {}), (3, 2, True), (2, True, None),
+        {"choice": "restless", "reward": "shaped", "fields": {"B": {"evaporation": "power_law"}}}),
     "labour of users": (
-        {
-            **{"learner": "sarsa", "sharing": "shared", "traffic": "following"},
-            **{"dense": False, "fields": "aB"},
-        },
-        (2, 2, False),
-        (2, True, None),
-        {"reward": "demanded", "pheromone": ALARM, "fields": {"a": ALARM, "B": ALARM}},
-    ),
+        ("sarsa", "shared", "following", False, "aB", {}), (2, 2, False), (2, True, None),
+        {"reward": "demanded", "pheromone": ALARM, "fields": {"a": ALARM, "B": ALARM}}),
     "choice by labour": (
-        {"learner": "q_learning", "sharing": "frozen", "dense": True, "fields": "aB"},
-        (2, 1, False),
-        (2, True, None),
-        {"choice": "hungry", "fields": {"a": {**ALARM, "deposited_when": "dead_end"}}},
-    ),
+        ("q_learning", "frozen", "blocking", True, "aB", {}), (2, 1, False), (2, True, None),
+        {"choice": "hungry", "fields": {"a": {**ALARM, "deposited_when": "dead_end"}}}),
     "own tables": (
-        {
-            **{"learner": "dyna_q", "sharing": "independent", "observation": "queues"},
-            **{"dense": True, "fields": "a", "cues": ("a", "compass"), "traffic": "following"},
-        },
-        (2, 3, True),
-        (2, True, None),
-        {},
-    ),
+        ("dyna_q", "independent", "following", True, "a",
+         {"observation": "queues", "cues": ("a", "compass")}),
+        (2, 3, True), (2, True, None), {}),
     "castes without labour": (
-        {
-            **{"learner": "expected_sarsa", "sharing": "shared", "observation": "trail_levels"},
-            **{"dense": True, "fields": "aB"},
-        },
-        (2, 2, False),
-        (3, False, [("B", "a"), ("trail", "compass")]),
-        {},
-    ),
-}
+        ("expected_sarsa", "shared", "blocking", True, "aB", {"observation": "trail_levels"}),
+        (2, 2, False), (3, False, [("B", "a"), ("trail", "compass")]), {}),
+}  # fmt: skip
+NAMES = ("learner", "sharing", "traffic", "dense", "fields")
 SLOW = ("labour of users",)
 
 
 def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[ProtocolEvent]] | None:
     """Return a drawn colony of a model and its protocol; None if its world has too few cells."""
-    arguments, (nests, kinds, loads), castes, changes = MODELS[name]
+    (*listed, more), (nests, kinds, loads), castes, changes = MODELS[name]
+    arguments = {**dict(zip(NAMES, listed, strict=True)), **more}
     drawn = random_colony(seed, 60, largest_range=8, noise=NOISE, changes=True, **arguments)
     if not drawn.task.food_changes or drawn.population["ants"] < 20:
         return None  # other kernels, or few steps
@@ -126,24 +86,6 @@ def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[ProtocolEvent]
     return made, protocol
 
 
-def assert_ants_equal(colony: Colony, plain: ReferenceColony) -> None:
-    """Compare the ants alone, because `assert_equal` is slow."""
-    slots = np.flatnonzero(colony.living[0])
-    assert slots.tolist() == sorted(plain.ants)
-    ants = [plain.ants[slot] for slot in slots.tolist()]
-    assert colony.grid.cells(colony.cells[0, slots]).tolist() == [list(a.cell) for a in ants]
-    for column, of_ant in (
-        (colony.headings, [ant.heading for ant in ants]),
-        (colony.events, [ant.event for ant in ants]),
-        (colony.paper_states, [ant.paper_state for ant in ants]),
-        (colony.states, [ant.state for ant in ants]),
-        (colony.actions, [ant.action for ant in ants]),
-        (colony.idle, [ant.own.get("idle", False) for ant in ants]),
-        (colony.streams, [ant.stream.state for ant in ants]),
-    ):
-        assert column[0, slots].tolist() == of_ant
-
-
 def steps_compared(
     drawn: RandomColony, protocol: list[ProtocolEvent], schedule: str, seen: Counter
 ) -> int:
@@ -152,34 +94,16 @@ def steps_compared(
     An episode ends early if its world does not allow an intervention.
     """
     colony = Colony(*drawn.model, **drawn.options, schedule=schedule)
-    timetable = Timetable(colony, protocol, TICKS)
-    plain = ReferenceColony(*drawn.model, **drawn.options)
-    twin, steps = Protocol(plain, protocol), 0
+    plain, steps = ReferenceColony(*drawn.model, **drawn.options), 0
     try:
-        for _ in range(EPISODES):
-            colony.begin_episode(TICKS)
-            twin.begin_episode()
-            with timetable:
-                for tick in range(TICKS):
-                    for _ in timetable.pieces(Colony._pieces, 1):
-                        pass
-                    twin.before_tick()
-                    steps += len(plain.ants)
-                    plain.tick(last=tick == TICKS - 1)
-                    assert_ants_equal(colony, plain)
-                    if tick % 25 == 24:
-                        assert_equal(colony, plain)
-            colony.end_episode()
-            twin.end_episode()
-            record = plain.records[-1]
-            seen["deliveries"] += record.deliveries
-            seen["births"] += record.births
-            seen["deaths"] += record.deaths
-            seen["later nests"] += sum(n for (nest, _), n in record.delivered.items() if nest)
-            seen["idle"] += sum(ant.own.get("idle", False) for ant in plain.ants.values())
-            seen["castes"] += len({ant.caste for ant in plain.ants.values()}) > 1
+        for _ in every_tick_of_protocol(colony, protocol, [plain], TICKS):
+            steps += len(plain.ants)
     except AntsError:
         seen["refused"] += 1
+    for record in plain.records:
+        seen["deliveries"] += record.deliveries
+        seen["deaths"] += record.deaths
+        seen["later nests"] += sum(n for (nest, _), n in record.delivered.items() if nest)
     return steps
 
 

@@ -35,14 +35,6 @@ def refused(parser, arguments, capsys):
     return capsys.readouterr().err
 
 
-def test_values_and_defaults(parser):
-    arguments = ["--size", "9", "--seed", "-4", "--count", "2", "--rates", "1", "2", "3", "--loud"]
-    parsed = vars(parser.parse_args(arguments))
-    assert parsed == {**{"size": 9, "seed": -4, "count": 2, "rates": [1.0, 2.0, 3.0]}, "loud": True}
-    parsed = vars(parser.parse_args([]))
-    assert parsed == {**{"size": 3, "seed": 0, "count": None, "rates": (0.1, 2.0)}, "loud": False}
-
-
 def test_what_was_given_is_told_even_where_it_is_the_default(parser):
     settings, given = parser.parse_given(["--size=3", "--rates", "1", "-2", "--loud"])
     assert given == {"size": "--size", "rates": "--rates", "loud": "--loud"}
@@ -160,19 +152,23 @@ def test_plugins_are_executed(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("1 / 0", "ZeroDivisionError: division by zero"),
-        ("(", "SyntaxError"),
-        ("raise SystemExit(0)", "SystemExit"),
-        ("import nosuchmodule", "nosuchmodule"),
-        ("raise ValueError('a\\nb')", "ValueError: a b"),
+        ("1 / 0", r"own\.py.*ZeroDivisionError: division by zero"),
+        ("(", "own.py.*SyntaxError"),
+        ("raise SystemExit(0)", "own.py.*SystemExit"),
+        ("raise ValueError('a\\nb')", "own.py.*ValueError: a b"),
+        ("import nosuchmodule", "'nosuchmodule'; install it, or save it in the plugin's folder."),
+        ("import random", r"random\.py' has an installed module's name; rename it"),
+        ("from numpy import pi", r"numpy\.py' has an installed module's name; rename it"),
+        ("import broken", "SyntaxError: .*broken.py"),
+        ("from taichi_ants import AntsError\nraise AntsError('It says so.')", r"^It says so\.$"),
     ],
 )
 def test_plugins_that_fail(text, says, tmp_path):
-    file = tmp_path / "own.py"
-    file.write_text(text)
-    with pytest.raises(AntsError, match=r"own\.py") as caught:
-        load_plugin(str(file))
-    assert says in str(caught.value)
+    for name in ("random", "numpy", "broken"):
+        (tmp_path / f"{name}.py").write_text("(")
+    (tmp_path / "own.py").write_text(text)
+    with pytest.raises(AntsError, match=says):
+        load_plugin(str(tmp_path / "own.py"))
 
 
 def test_a_plugin_imports_files_of_its_folder(tmp_path, monkeypatch):
@@ -210,30 +206,6 @@ def test_the_packages_and_texts_of_a_plugin_travel_with_it(tmp_path):
     assert Path(sys.modules["parts"].__file__).parents[1] != tmp_path
     with pytest.raises(AntsError, match=r"loaded another file 'study\.py'; start new workers"):
         load_code([{**code, "more": b""}])
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("import random", r"random\.py' has an installed module's name; rename it"),
-        ("from numpy import pi", r"numpy\.py' has an installed module's name; rename it"),
-        ("import not_there", "'not_there'; install it, or save it in the plugin's folder."),
-        ("import broken", "SyntaxError: .*broken.py"),
-    ],
-)
-def test_files_that_a_plugin_cannot_import(text, says, tmp_path):
-    for name in ("random", "numpy", "broken"):
-        (tmp_path / f"{name}.py").write_text("(")
-    (tmp_path / "own.py").write_text(text)
-    with pytest.raises(AntsError, match=says):
-        load_plugin(str(tmp_path / "own.py"))
-
-
-def test_what_a_plugin_says_itself_is_passed_on(tmp_path):
-    file = tmp_path / "own.py"
-    file.write_text("from taichi_ants import AntsError\nraise AntsError('no such thing.')")
-    with pytest.raises(AntsError, match=r"^no such thing\.$"):
-        load_plugin(str(file))
 
 
 @pytest.mark.parametrize("name", ["missing.py", "folder.py", "text.txt", "a\0b.py", ""])

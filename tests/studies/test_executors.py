@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pickle
 import re
-import signal
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -83,41 +82,6 @@ def test_pickled_blocks_have_the_same_outcomes(study, tmp_path):
     again = executor.calls
     assert same(plain, outcome(study, tmp_path, executor=executor))
     assert executor.calls == again  # nothing is missing
-
-
-def die_once(marker: str) -> int:
-    """Kill this process, the first time."""
-    if not os.path.exists(marker):
-        Path(marker).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return os.getpid()
-
-
-class Deadly(Workers):
-    """Workers of which one dies before its first block."""
-
-    def __init__(self, workers: int, marker: Path) -> None:
-        super().__init__(workers)
-        self.marker, self.calls = str(marker), 0
-
-    def submit(self, call, *arguments):
-        self.calls += 1
-        return super().submit(_die_or_do, self.marker, arguments)
-
-
-def _die_or_do(marker, arguments):
-    die_once(marker)
-    return run_pickled(*arguments)
-
-
-@pytest.mark.slow
-def test_a_killed_worker_process_costs_its_blocks_only(tmp_path, monkeypatch):
-    plain = outcome(COLONIES, tmp_path / "plain")
-    monkeypatch.setattr(ColonyPoint, "runs_of_a_block", 2)
-    with Deadly(2, tmp_path / "died") as executor:
-        assert same(plain, outcome(COLONIES, tmp_path / "other", executor=executor))
-    assert (tmp_path / "died").exists()
-    assert 4 < executor.calls <= 4 + 2  # the dead worker had two blocks
 
 
 class Fails(Here):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import socket
@@ -16,6 +15,7 @@ from command_lines import (
     assert_one_sentence,
     assert_same_results,
     call,
+    descendants,
     environment,
     promptly,
     run,
@@ -31,11 +31,7 @@ seeds = 1000
 episodes = 300
 max_steps = 600
 rollouts = 3
-[training]
-learner = "sarsa"
-discount = 0.9
-epsilon = 0.3
-epsilon_decay = 0.99
+training = {learner = "sarsa", discount = 0.9, epsilon = 0.3, epsilon_decay = 0.99}
 [vary]
 training.learning_rate = [0.01, 0.1, 0.2]
 task.rewards.shaping = [1, 0]
@@ -100,43 +96,44 @@ def plain(tmp_path_factory, kernels):
     """The results of the sweep without Ray."""
     folder = tmp_path_factory.mktemp("plain")
     (folder / "my.toml").write_text(SWEEP)
-    assert run("sweep", ["my.toml", "--out", "a", "--no-figures"], kernels, folder).returncode == 0
+    assert run("sweep", ARGUMENTS, kernels, folder).returncode == 0
     return folder / "a"
 
 
-def tree(pid: int) -> dict[int, str]:
-    """Return the command lines of all descendants of a process, by process."""
-    rows = []
-    for path in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):
-            parent = int((path / "stat").read_text().rpartition(")")[2].split()[1])
-            rows.append((int(path.name), parent, (path / "cmdline").read_text()))
-    found = {pid: ""}
-    for _ in range(5):
-        found |= {one: line for one, parent, line in rows if parent in found}
-    return {one: line for one, line in found.items() if one != pid}
+@pytest.fixture
+def running(kernels, tmp_path):
+    """Start the sweep with more arguments, and return its process when it has written a block."""
+
+    def started(*more):
+        pytest.importorskip("ray")
+        (tmp_path / "my.toml").write_text(SWEEP)
+        process = start("sweep", [*ARGUMENTS, *more], kernels, tmp_path)
+        until = time.monotonic() + 240
+        while not blocks_in(tmp_path) and process.poll() is None and time.monotonic() < until:
+            time.sleep(0.05)
+        assert process.poll() is None
+        assert blocks_in(tmp_path)
+        return process
+
+    return started
+
+
+ARGUMENTS = ["my.toml", "--out", "a", "--no-figures"]
 
 
 def blocks_in(folder: Path) -> set[Path]:
     return set(folder.rglob("*.npz"))
 
 
-def wait_for_blocks(process: subprocess.Popen, folder: Path) -> None:
-    until = time.monotonic() + 240
-    while len(blocks_in(folder)) < 2 and process.poll() is None and time.monotonic() < until:
-        time.sleep(0.05)
-    assert process.poll() is None
-    assert blocks_in(folder)
+def kill(pid: int, program: str) -> None:
+    """Kill a descendant of a process."""
+    os.kill(next(one for one, line in descendants(pid).items() if program in line), 9)
 
 
 @pytest.mark.long
-def test_a_killed_worker_costs_its_blocks_only(plain, kernels, tmp_path):
-    pytest.importorskip("ray")
-    (tmp_path / "my.toml").write_text(SWEEP)
-    arguments = ["my.toml", "--out", "a", "--no-figures", "--ray"]
-    process = start("sweep", arguments, kernels, tmp_path)
-    wait_for_blocks(process, tmp_path)
-    os.kill(next(one for one, line in tree(process.pid).items() if "ray::run_pickled" in line), 9)
+def test_a_killed_worker_costs_its_blocks_only(plain, running, tmp_path):
+    process = running("--ray")
+    kill(process.pid, "ray::run_pickled")
     out, err = process.communicate(timeout=500)
     assert (process.returncode, err) == (0, "")
     assert "all results are in a/" in out
@@ -144,13 +141,9 @@ def test_a_killed_worker_costs_its_blocks_only(plain, kernels, tmp_path):
 
 
 @pytest.mark.long
-def test_ctrl_c_ends_ray_and_the_work_resumes(plain, kernels, tmp_path):
-    pytest.importorskip("ray")
-    (tmp_path / "my.toml").write_text(SWEEP)
-    arguments = ["my.toml", "--out", "a", "--no-figures"]
-    process = start("sweep", [*arguments, "--ray"], kernels, tmp_path)
-    wait_for_blocks(process, tmp_path)
-    others, began = tree(process.pid), time.monotonic()
+def test_ctrl_c_ends_ray_and_the_work_resumes(plain, running, kernels, tmp_path):
+    process = running("--ray")
+    others, began = descendants(process.pid), time.monotonic()
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert time.monotonic() - began < promptly()
@@ -159,7 +152,7 @@ def test_ctrl_c_ends_ray_and_the_work_resumes(plain, kernels, tmp_path):
     while any(Path(f"/proc/{one}").exists() for one in others):
         assert time.monotonic() - began < 2 * promptly()
         time.sleep(0.05)
-    assert run("sweep", arguments, kernels, tmp_path).returncode == 0
+    assert run("sweep", ARGUMENTS, kernels, tmp_path).returncode == 0
     assert_same_results(plain, tmp_path / "a", also=["packages"])
 
 
@@ -199,11 +192,8 @@ def cluster(kernels):
 
 
 @pytest.mark.long
-def test_two_of_eight_machines_die(plain, kernels, cluster, tmp_path):
-    (tmp_path / "my.toml").write_text(SWEEP)
-    arguments = ["my.toml", "--out", "a", "--no-figures", "--ray", cluster.address]
-    process = start("sweep", arguments, kernels, tmp_path)
-    wait_for_blocks(process, tmp_path)
+def test_two_of_eight_machines_die(plain, running, cluster, tmp_path):
+    process = running("--ray", cluster.address)
     for _ in range(2):
         cluster.stdin.write("\n")
         cluster.stdin.flush()
@@ -215,13 +205,10 @@ def test_two_of_eight_machines_die(plain, kernels, cluster, tmp_path):
 
 
 @pytest.mark.long
-def test_a_dead_head_ends_the_command_with_a_sentence(plain, kernels, cluster, tmp_path):
+def test_a_dead_head_ends_the_command_with_a_sentence(plain, running, kernels, cluster, tmp_path):
     """The last test of the cluster, which does not survive it."""
-    (tmp_path / "my.toml").write_text(SWEEP)
-    arguments = ["my.toml", "--out", "a", "--no-figures"]
-    process = start("sweep", [*arguments, "--ray", cluster.address], kernels, tmp_path)
-    wait_for_blocks(process, tmp_path)
-    os.kill(next(one for one, line in tree(cluster.pid).items() if "gcs_server" in line), 9)
+    process = running("--ray", cluster.address)
+    kill(cluster.pid, "gcs_server")
     began = time.monotonic()
     out, err = process.communicate(timeout=500)
     assert time.monotonic() - began < 30 * promptly()  # Ray itself needs a minute
@@ -229,5 +216,5 @@ def test_a_dead_head_ends_the_command_with_a_sentence(plain, kernels, cluster, t
     assert_one_sentence(err.lstrip("\n"))
     assert "the head of the Ray cluster at '" in err
     assert "does not answer any more; finished parts are saved, so run the same command" in err
-    assert run("sweep", arguments, kernels, tmp_path).returncode == 0
+    assert run("sweep", ARGUMENTS, kernels, tmp_path).returncode == 0
     assert_same_results(plain, tmp_path / "a", also=["packages"])

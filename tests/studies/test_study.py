@@ -288,31 +288,13 @@ def test_runs_that_are_missing_are_read_as_nan_or_0(tmp_path):
     assert found["number"].tolist() == [[1, 0]]
 
 
-def test_an_interruption_loses_one_block_at_most(study, tmp_path):
-    def stop(share):
-        if share > 0.4:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run(study, Store(tmp_path), progress=stop)
-    assert 1 <= len(files_in(tmp_path)) < len(list(study.blocks(np.ones((5, 5), bool))))
-    assert same(outcomes_of(study, tmp_path), outcomes_of(study, tmp_path / "other"))
-
-
 @pytest.mark.parametrize(
     ("point", "change", "says"),
     [
         (POINTS[0], {"training": TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99)}, "'td_zero'"),
-        (POINTS[0], {"training": None}, "configs is None"),
-        (POINTS[0], {"task": "paper"}, "task is 'paper'"),
-        (POINTS[0], {"max_steps": 10**8}, "max_steps is 100000000"),
         (POINTS[0], {"rollouts": 0}, "rollouts is 0"),
-        (ALONE, {"ants": 0}, "ants is 0"),
-        (ALONE, {"capacity": 3, "ants": 9}, "because 9 ants start"),
-        (ALONE, {"start": "there"}, "start is 'there'"),
         (ALONE, {"sharing": "frozen"}, "sharing is 'frozen'"),
         (ALONE, {"episodes": 0}, "episodes is 0"),
-        (ALONE, {"ticks": 0}, "ticks is 0"),
         (ALONE, {"after": replace(ALONE, sharing="independent")}, "no shared table"),
         (ALONE, {"training": LAMBDA}, "'sarsa_lambda' has no TD error that can be summed"),
     ],

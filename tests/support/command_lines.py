@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import importlib
 import json
@@ -84,6 +85,19 @@ def start(
         text=True,
         **settings,
     )
+
+
+def descendants(pid: int) -> dict[int, str]:
+    """Return the command lines of all descendants of a process, by process."""
+    rows = []
+    for path in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            parent = int((path / "stat").read_text().rpartition(")")[2].split()[1])
+            rows.append((int(path.name), parent, (path / "cmdline").read_text()))
+    found = {pid: ""}
+    for _ in range(5):
+        found |= {one: line for one, parent, line in rows if parent in found}
+    return {one: line for one, line in found.items() if one != pid}
 
 
 def load(name: str) -> ModuleType:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 
 from taichi_ants.analysis.bounds import ExpectedEpisode
@@ -79,20 +77,6 @@ class PlainWorld:
             found[state] = [self.outcomes(state, action) for action in range(5)]
             todo += [after for outcomes in found[state] for after, _ in outcomes]
         return found
-
-
-def search_all_sequences(plain: PlainWorld, max_steps: int) -> tuple:
-    """Return (return, steps, deliveries) of the shortest delivery, the best one on a tie."""
-    delivered = []
-    for actions in product(range(5), repeat=max_steps):
-        state, reward = plain.start, 0
-        for steps, action in enumerate(actions, start=1):
-            [(state, gained)] = plain.outcomes(state, action)
-            reward += gained
-            if state is DELIVERED:
-                delivered.append((reward, steps, 1))
-                break
-    return min(delivered, key=lambda episode: (episode[1], -episode[0]))
 
 
 def search_shortest(plain: PlainWorld) -> ExpectedEpisode | None:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from plain_interventions import Protocol
 
 from taichi_ants import Colony, World, features
 from taichi_ants.engines.colony.layout import FoodSourceRow, NestRow, WorldRow
+from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.features.feature import ANT, CELL, NEST
+from taichi_ants.protocol import ProtocolEvent
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import FOOD
 
@@ -29,6 +32,29 @@ def every_tick(
                 yield
         colony.end_episode()
         plain.end_episode()
+
+
+def every_tick_of_protocol(
+    colony: Colony, protocol: list[ProtocolEvent], plains: list[ReferenceColony], ticks: int
+) -> Iterator[None]:
+    """Yield after each tick of two episodes, in which each world equals a reference colony."""
+    timetable, twins = Timetable(colony, protocol, ticks), [Protocol(p, protocol) for p in plains]
+    for _ in range(2):
+        colony.begin_episode(ticks)
+        for twin in twins:
+            twin.begin_episode()
+        with timetable:
+            for tick in range(ticks):
+                for _ in timetable.pieces(Colony._pieces, 1):
+                    pass
+                for w, (plain, twin) in enumerate(zip(plains, twins, strict=True)):
+                    twin.before_tick()
+                    plain.tick(last=tick == ticks - 1)
+                    assert_equal(colony, plain, w)
+                yield
+        colony.end_episode()
+        for twin in twins:
+            twin.end_episode()
 
 
 def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None:
@@ -58,9 +84,17 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
     assert ours.ground[places].tolist() == list(plain.world.ground.values())
+    ants = {ant.number: ant for ant in theirs}
+    in_order = [ants[number] for number in ours.ant_numbers.tolist()]
+    assert ours.ant_nests.tolist() == [ant.nest for ant in in_order]
+    kinds = [ant.own["kind"] if ant.carries else -1 for ant in in_order]
+    assert ours.ant_foods.tolist() == kinds
+    assert ours.queens.tolist() == [int(grid.index(cell)) for cell in plain.world.queens]
     food = np.flatnonzero(ours.ground == FOOD)
     at = world * grid.size + food
     their_foods = [tuple(cell) for cell in grid.cells(food).tolist()]
+    kinds = [plain.world.of_cells[cell]["kind_of"] for cell in their_foods]
+    assert ours.food_kinds[food].tolist() == kinds
     for feature, array in features.arrays(CELL):
         if feature.is_used(colony.task):
             held = [plain.world.of_cells[cell][array.name] for cell in their_foods]

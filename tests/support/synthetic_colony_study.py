@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import product
 
 import numpy as np
 from colony_findings import REGIMES, RULES, Condition, Measured
 
 SIZES = (1, 2, 4, 8)
-
-
 # (rules, regime, ants) -> deliveries per 1000 ticks of the whole colony.
 Truth = Callable[[str, str, int], float]
 
@@ -27,36 +26,23 @@ def build(
     sizes: Sequence[int] = SIZES,
     regimes: Sequence[str] = tuple(REGIMES),
     rules: Sequence[str] = tuple(RULES),
-    first: Callable[[int], int] = lambda ants: 40,
-    reward: Truth = lambda rules, regime, ants: 500.0,
     world_kinds: Sequence[str] = ("paper",),
 ) -> Measured:
-    """Return a study with the given deliveries and noise; the bound is 25 per ant.
-
-    Args:
-        truth: Deliveries per 1000 ticks.
-        seeds, sizes, regimes, rules, world_kinds: The conditions.
-        noise: Standard deviation over seeds, in percent of the truth.
-        first: Ticks to the first delivery, by number of ants.
-        reward: Reward per ant and 1000 ticks.
-    """
+    """Return a study with noise in percent of the truth over seeds; the bound is 25 per ant."""
     random = np.random.default_rng(0)
     measured = {}
-    for world_kind in world_kinds:
-        for one in rules:
-            for regime in regimes:
-                for ants in sizes:
-                    spread = 1 + noise / 100 * random.standard_normal(seeds)
-                    deliveries = truth(one, regime, ants) * spread
-                    measured[Condition(world_kind, one, regime, ants)] = {
-                        "deliveries": deliveries,
-                        "greedy": 1.5 * deliveries,
-                        "bound": np.full(seeds, 25.0 * ants),
-                        "bound_share": deliveries / (25.0 * ants),
-                        "per_ant": deliveries / ants,
-                        "first_delivery": np.full(seeds, float(first(ants))),
-                        "no_delivery_rate": np.zeros(seeds),
-                        "blocked": np.full(seeds, ants / 100),
-                        "reward": reward(one, regime, ants) * spread,
-                    }
+    for world_kind, one, regime, ants in product(world_kinds, rules, regimes, sizes):
+        spread = 1 + noise / 100 * random.standard_normal(seeds)
+        deliveries = truth(one, regime, ants) * spread
+        measured[Condition(world_kind, one, regime, ants)] = {
+            "deliveries": deliveries,
+            "greedy": 1.5 * deliveries,
+            "bound": np.full(seeds, 25.0 * ants),
+            "bound_share": deliveries / (25.0 * ants),
+            "per_ant": deliveries / ants,
+            "first_delivery": np.full(seeds, 40.0),
+            "no_delivery_rate": np.zeros(seeds),
+            "blocked": np.full(seeds, ants / 100),
+            "reward": 500.0 * spread,
+        }
     return measured

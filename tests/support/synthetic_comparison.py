@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -121,27 +122,19 @@ def build(
     truth: Callable[[Variant, GridPoint], Truth] = paper_truth,
     random_seed: int = 7,
 ) -> Made:
-    """Return a random comparison around the truth.
+    """Return a random comparison around the truth, with an edit of it for each delivery setting.
 
-    Args:
-        edits: A change of the truth for each delivery setting.
-        seeds, episodes, rollouts: Sizes.
-        variants, grid: The configurations.
-        noise: Standard deviation of every episode's return and length.
-        shared: Standard deviation of the effect of a seed on the returns of all rows.
-        truth: The truth before the edits.
-        random_seed: Seed of the noise.
+    `noise` and `shared` are standard deviations: of every episode's return and length, and of the
+    effect of a seed on the returns of all rows.
     """
     random = np.random.default_rng(random_seed)
     seed_effects = random.normal(0, shared, size=(seeds, 1))
     rows, runs, greedy = [], [], []
-    for delivery, edit in edits.items():
-        for variant in variants:
-            for point in grid:
-                rows.append(Row(delivery, variant, point))
-                row = edit(variant, point, truth(variant, point))
-                runs.append(_runs(random, row, seed_effects, episodes, noise))
-                greedy.append(_rollouts(row, seeds, rollouts))
+    for (delivery, edit), variant, point in product(edits.items(), variants, grid):
+        rows.append(Row(delivery, variant, point))
+        row = edit(variant, point, truth(variant, point))
+        runs.append(_runs(random, row, seed_effects, episodes, noise))
+        greedy.append(_rollouts(row, seeds, rollouts))
     arrays = dict(zip(EPISODES, np.moveaxis(np.array(runs), 1, 0), strict=True))
     arrays |= dict(zip(ROLLOUTS, np.moveaxis(np.array(greedy), 1, 0), strict=True))
     return comparison_of(arrays, tuple(rows))

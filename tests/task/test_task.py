@@ -117,6 +117,11 @@ REFUSED = [
     (lambda: Pheromone(deposit="none", level=3), f"task.pheromone.level` is 3{UNLESS}deposit`"),
     (lambda: Traffic(reward_pushed=True), f"task.traffic.reward_pushed` is True{UNLESS}swap`"),
     (lambda: Traffic(carriers_first=True), f"task.traffic.carriers_first` is True{UNLESS}swap`"),
+    (lambda: Traffic(swap="yes"), "task.traffic.swap` is 'yes'"),
+    (
+        lambda: Task(traffic="left"),
+        "is 'left'; it must be a Traffic, or one of blocking, r",
+    ),
     (lambda: Choice("greedy", temperature=2.0), f"task.choice.temperature` is 2.0{UNLESS}rule`"),
     (lambda: Noise(slip=1.5), "task.noise.slip` is 1.5; it must be between 0 and 1."),
     (lambda: Task(choice=CELLS, homing_cue="trail"), "which ants with food follow already"),

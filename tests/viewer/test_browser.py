@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from browser import Page, started
+from browser import Page
 from playback import played
 
 from taichi_ants import Colony, Task, TrainingConfig, worlds
@@ -20,12 +20,6 @@ from taichi_ants.viewer import Recording, page, record_colony, record_trace
 pytestmark = pytest.mark.browser
 
 MINUS = "\N{MINUS SIGN}"  # as the page writes it
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with started() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")

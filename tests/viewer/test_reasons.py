@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from browser import Page, started
+from browser import Page
 
 from taichi_ants import Colony, Task, TrainingConfig, rules, worlds
 from taichi_ants.features.rule import RULES
@@ -62,12 +62,6 @@ def _registered():
     rules.register("choice")(straight)
     yield
     del RULES.yours["straight"]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with started() as one:
-        yield one
 
 
 def begun(name: str, epsilon: float = 0.0) -> Colony:

@@ -2,11 +2,13 @@
  * the steps of an ant (`walks`); one with `code` checks a function that a student writes, and throws a sentence if it is wrong.
  * No DOM is needed. */
 
-import { hexDistance, LETTERS } from "../../../lab/page/engine.js";
+import { hexDistance } from "../../../lab/page/worlds.js";
 import { live, PLAN } from "./room.js";
 import { Random } from "./random.js";
 
 export const ACTS = ["left", "forward", "right", "pick up", "deliver"];
+// What ants see: empty, obstacle, trail or nearer to the nest, food or queen.
+const LETTERS = [["E", "O", "T", "F"], ["E", "O", "S", "Q"]];
 const CUE = 2, CARRIES = 64; // the code of a trail or of a way home; the first observation with food
 const ANTS = 2000, VISITS = 500, PLACES = 5;                  // of lesson 1
 const STEPS_HOME = 34, QUEEN_AT = [-9, 0], COLUMNS = 21, CENTRE = 10; // of the paper's world

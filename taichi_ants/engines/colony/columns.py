@@ -51,7 +51,6 @@ def trait(column, ant):
 
 @function
 def put(column, ant, value):
-    """Set a value of an ant in a byte column."""
     column[ant] = ti.cast(value, ti.i8)
 
 
@@ -64,7 +63,6 @@ def individual(c, w, ant):
 
 @function
 def nest_of(c, v, ant):
-    """Return the nest of an ant."""
     nest = 0
     if ti.static(v.n_nests > 1):
         nest = trait(c.nest, ant)

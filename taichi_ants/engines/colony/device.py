@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 from weakref import ref
 
@@ -20,7 +20,7 @@ _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
 _OF_THREADS = "orders", "barrier"  # which only kernels of other schedules read
 
 
-class DeviceArrays(MutableMapping[str, np.ndarray]):
+class DeviceArrays(Mapping[str, np.ndarray]):
     """NumPy arrays by name, of which kernels change copies on a device.
 
     An array that is read is copied from the device first, and to the device before the next launch,
@@ -33,7 +33,7 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
         self._newer: set[str] = set()  # on the device
         self._memories: dict[str, Any] = {}  # none: to be laid out
         self._taichi: Any = lambda: None  # the Taichi runtime that has the memories
-        self.update(arrays or {})
+        self |= arrays or {}
 
     def __getitem__(self, name: str) -> np.ndarray:
         array = self._arrays[name]
@@ -50,11 +50,6 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
         self._newer.discard(name)
         self._changed.add(name)
 
-    def __delitem__(self, name: str) -> None:
-        self._fetch([*self._newer])
-        self._memories = {}
-        del self._arrays[name]
-
     def __iter__(self) -> Iterator[str]:
         return iter(self._arrays)
 
@@ -62,7 +57,8 @@ class DeviceArrays(MutableMapping[str, np.ndarray]):
         return len(self._arrays)
 
     def __ior__(self, arrays: Any) -> Any:
-        self.update(arrays)
+        for name, array in arrays.items():
+            self[name] = array
         return self
 
     def __reduce__(self) -> Any:

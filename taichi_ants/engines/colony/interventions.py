@@ -277,7 +277,6 @@ class _World:
         return slots[to >= 0], to[to >= 0]
 
     def _step_aside(self, ants: np.ndarray, to: np.ndarray) -> None:
-        """Move the ants in some slots to other cells."""
         ground, at = self.view("ground"), self.view("cell")[ants]
         self.view("cell")[ants] = to
         ground[to] = ground[at]
@@ -326,7 +325,6 @@ class _World:
         self._count_ants()
 
     def _remove(self, slots: np.ndarray) -> None:
-        """Remove the ants in some slots."""
         colony = self.colony
         numbers = self.view("number")[slots]
         first = numbers < colony.ants  # their streams continue in the next episode
@@ -439,7 +437,8 @@ class Interventions:
             for number, pheromone in enumerate(colony.pheromones)
             if not pheromone.dense
         }
-        colony._set_task(task)
+        colony.task, colony.pheromones = task, task.pheromones_while(colony.learns)
+        colony.arrays |= colony._settings()
         for which, (stored, clock) in before.items():
             _, now = colony._stored_pheromone(*which)
             stored[:] = np.where(stored > clock, stored - clock + now, 0)
@@ -447,14 +446,8 @@ class Interventions:
     def state(self) -> str:
         """Return a hash of the whole state; colonies with equal hashes behave identically."""
         colony, streams = self.colony, [self.stream(w).state for w in self.worlds]
-        rest: Any = [
-            colony.epsilon,
-            colony.learning_rate,
-            colony.length,
-            colony.ticks,
-            colony.ants,
-        ]
-        rest += [self.ants, streams, colony.task.as_dict(), colony.training.as_dict()]
+        rest: Any = [colony.epsilon, colony.learning_rate, colony.length, colony.ticks]
+        rest += [colony.ants, self.ants, streams, colony.task.as_dict(), colony.training.as_dict()]
         maps = arrays_of(colony._model.senses)
         arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", *maps)}
         arrays |= {f"start {w}": start for w, start in enumerate(self.starts)}

@@ -16,22 +16,13 @@ import taichi as ti
 from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
-from taichi_ants.engines.colony import (
-    columns,
-    layout,
-    learning,
-    life,
-    memory,
-    own_inputs,
-    steps,
-    trail,
-)
+from taichi_ants.engines.colony import layout, learning, life, memory, own_inputs, steps, trail
 from taichi_ants.engines.colony.barrier import next_group, part_of, share_of_part
-from taichi_ants.engines.colony.columns import chunks_of, function, share_of
+from taichi_ants.engines.colony.columns import chunks_of, function, share_of, trait
 from taichi_ants.engines.colony.layout import Order, WorldRow
 from taichi_ants.engines.colony.views import entries_of
 from taichi_ants.features import hooks_at
-from taichi_ants.kernel_functions import while_compiling
+from taichi_ants.kernel_functions import kernel_function, while_compiling
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
@@ -94,7 +85,7 @@ class Variant:
             self.td_error = guarded(model.learner.td_error)
         self.level_type = ti.f32 if model.sees_dense else ti.i32
         if not model.is_papers:
-            self.encode = views.encode_function(model.observation)
+            self.encode = kernel_function(model.observation.encode)
             reads_dense = tuple(model.dense_by_number[number] for number in model.reads)
             self.view_type = views.view_type(model.observation, model.sees_dense, reads_dense)
 
@@ -115,7 +106,6 @@ class Variant:
         )
 
     def dense_fields(self, c: Any) -> list[trail.PheromoneArrays]:
-        """Return the arrays and numbers of the dense pheromones."""
         return [self.field(c, number) for number, dense in enumerate(self.dense_by_number) if dense]
 
 
@@ -204,14 +194,21 @@ def is_taken(c, v, ant):
     """Return whether an ant is in a slot; without vacant slots, always, while a kernel compiles."""
     taken = True
     if ti.static(v.slots_matter):
-        taken = columns.trait(c.stage, ant) != layout.Stage.VACANT
+        taken = trait(c.stage, ant) != layout.Stage.VACANT
     return taken
 
 
+# What all ants do between two ticks.
+ONCE = {
+    "begin": Phase(ANTS, learning.begin),
+    "see_interventions": Phase(ANTS, learning.see_interventions),
+}
+
+
 @cache
-def once(v: Variant, what: Callable[..., None], arguments: Any) -> Callable[..., None]:
-    """Return a kernel of what all ants do between two ticks."""
-    phase = Phase(ANTS, what)
+def once(v: Variant, name: str, arguments: Any) -> Callable[..., None]:
+    """Return a kernel of what all ants do between two ticks, by its name."""
+    phase = ONCE[name]
 
     @ti.kernel
     def advance_colony(c: arguments):
@@ -251,18 +248,10 @@ def do_one(phase, c, v, i):
             phase.do(c, v, w, tick)
 
 
-ONCE = {"begin": learning.begin, "see_interventions": learning.see_interventions}
-
-
-def launches_of_tick(v: Variant, planning_steps: int) -> list[str]:
-    """Return the names for `by_ant` of the kernels of a tick."""
-    return ["first", *["planning"] * planning_steps, "last"] if v.plans_together else ["tick"]
-
-
 @cache
 def by_ant(v: Variant, name: str, contents: memory.Contents, arguments: Any) -> Callable[..., None]:
     """Return a kernel with a parallel loop for each phase, or for several of a group."""
-    groups: list[Group] = [(Phase(ANTS, ONCE[name]),)] if name in ONCE else []
+    groups: list[Group] = [(ONCE[name],)] if name in ONCE else []
     if name in ("tick", "first"):
         groups += tick_groups(v)
     if name == "planning":

@@ -47,7 +47,6 @@ COLUMNS = {array.name: array for array in (*_CORE, *(array for _, array in array
 
 
 def columns_of(model: Model) -> list[Array]:
-    """Return the columns that a model needs."""
     needs = {
         "state": not model.sees_paper_state,
         "reward": model.has_own_reward,

@@ -37,7 +37,6 @@ def see_anew(c, v, w, ant, tick):
 
 @function
 def note_seen(c, v, ant, paper_state, state):
-    """Store the paper's state and the state index of an ant."""
     columns.put(c.paper_state, ant, paper_state)
     if ti.static(not v.sees_paper_state):
         c.state[ant] = state

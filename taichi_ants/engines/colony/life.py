@@ -129,7 +129,6 @@ def draw_caste(c, v, w, nest):
 
 @function
 def place_newborn(c, v, w, nest, ant, cell, heading):
-    """Put a newborn ant into a slot and onto a cell."""
     number = c.worlds[WorldRow.NEXT_NUMBER, w]
     c.cell[ant] = cell
     put(c.heading, ant, heading)
@@ -197,7 +196,6 @@ def regrow(c, v, w, tick):
 
 @function
 def place_of(c, w, source):
-    """Return the place of a food source in the arrays of cells."""
     return w * c.size + c.food_sources[FoodSourceRow.CELL, source]
 
 

@@ -104,7 +104,6 @@ class OwnRule:
 
 
 def own_rules(rules: Sequence[Rule]) -> dict[Rule, OwnRule]:
-    """Return the rules of a task in kernels."""
     firsts = accumulate((len(rule.parameters) for rule in rules), initial=0)
     return {rule: OwnRule(rule, first) for rule, first in zip(rules, firsts, strict=False)}
 

@@ -23,7 +23,6 @@ _TYPES["u8"] = ti.u64, ti.u64, 64
 
 
 def scratch(n_slots: int, n_chunks: int) -> dict[str, np.ndarray]:
-    """Return the arrays that a sort needs, for all slots and chunks of all worlds."""
     return {
         "order": np.zeros(n_slots, np.int32),  # the slot from which the ant in each slot comes
         "spare": np.zeros(n_slots, np.uint64),
@@ -60,7 +59,6 @@ def digit_of(c, i, high):
 
 @function
 def count(c, v, chunk, first, last, high):
-    """Count the digits of a chunk."""
     counts = 2 * _N_DIGITS * chunk
     for digit in range(_N_DIGITS):
         c.digits[counts + digit] = 0
@@ -96,7 +94,6 @@ def place(c, v, chunk, first, last, high):
 
 @cache
 def sort(columns: tuple[str, ...], arguments: Any) -> Callable[..., None]:
-    """Return a kernel that sorts some columns of all ants by cell."""
     v, moves = _VARIANT, tuple(moved_together(columns))
 
     @function

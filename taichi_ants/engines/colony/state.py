@@ -14,30 +14,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 import numpy as np
 
 from taichi_ants import arguments, files, learners, runtime
-from taichi_ants.engines.colony import food_sources
+from taichi_ants.engines.colony import food_sources, layout
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
-from taichi_ants.engines.colony.layout import (
-    ANT_GROUND,
-    ANTS_OF_PLACE,
-    BARRIER_SIZE,
-    BY_ANT,
-    COLUMNS,
-    NESTS_BY_KINDS,
-    PLACES,
-    SORTED_BITS,
-    TALLY_WIDTH,
-    TOTALS,
-    TOUCHED_LINE,
-    NestRow,
-    Order,
-    Stage,
-    SumRow,
-    WorldRow,
-    array_of,
-    columns_of,
-    most_chunks,
-    schedule_of,
-)
+from taichi_ants.engines.colony.layout import BY_ANT, COLUMNS, NestRow, Order, Stage, WorldRow
 from taichi_ants.engines.layout import compass_of, note_best_actions
 from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole
 from taichi_ants.features import FEATURES, arrays, numbers, used_by, without_files
@@ -75,15 +54,6 @@ _KIND = Kind("colony", 14, "Colony.save", sealed=True)
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
-
-
-def _no_arrays(schedule: str) -> Any:
-    """Return an empty dictionary for arrays; for a GPU, they will be on the device."""
-    if schedule != BY_ANT:
-        return {}
-    from taichi_ants.engines.colony.device import DeviceArrays  # imports Taichi
-
-    return DeviceArrays()
 
 
 def _view_of(array: Array) -> property:
@@ -125,23 +95,9 @@ class ColonyState:
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
     """
 
-    if TYPE_CHECKING:  # the views of arrays, see below; features declare others
+    if TYPE_CHECKING:  # the views of arrays, see below
 
         def __getattr__(self, name: str) -> np.ndarray: ...
-
-        _stages: np.ndarray
-        actions: np.ndarray
-        carried: np.ndarray
-        carrying: np.ndarray
-        cells: np.ndarray
-        events: np.ndarray
-        executed: np.ndarray
-        headings: np.ndarray
-        nests: np.ndarray
-        next_actions: np.ndarray
-        numbers: np.ndarray
-        paper_states: np.ndarray
-        states: np.ndarray
 
     def __init__(
         self,
@@ -172,7 +128,7 @@ class ColonyState:
         table = None if q_values is None else checked_values(q_values, task)
         self.seeds = arguments.checked_seeds(seeds)
         running = runtime.start(threads, arch)
-        self.schedule = schedule_of(schedule, len(self.seeds), self.capacity, running.arch)
+        self.schedule = layout.schedule_of(schedule, len(self.seeds), self.capacity, running.arch)
         self.n_nests = 0
         worlds = self._checked_worlds(world)
         self.n_nests, shape = worlds[0].n_nests, () if table is None else table.shape
@@ -188,11 +144,15 @@ class ColonyState:
         self._shared_rows = model.n_rows if sharing == "shared" else 0
         self.chunks = 1
         if self.schedule != "by_world":
-            places = min(PLACES, -(-self.capacity // ANTS_OF_PLACE))
+            places = min(layout.PLACES, -(-self.capacity // layout.ANTS_OF_PLACE))
             places = places if self.schedule == BY_ANT else running.threads
             sizes = len(self.seeds), self.capacity, self._shared_rows * ROW, places
-            self.chunks = most_chunks(*sizes)
-        self.arrays = _no_arrays(self.schedule)
+            self.chunks = layout.most_chunks(*sizes)
+        self.arrays: Any = {}
+        if self.schedule == BY_ANT:
+            from taichi_ants.engines.colony.device import DeviceArrays  # imports Taichi
+
+            self.arrays = DeviceArrays()
         self._lay_out(worlds)
         self.arrays |= (lasting := self._lasting(table))
         self.stored = (*self._changing, *lasting)
@@ -325,7 +285,7 @@ class ColonyState:
     def _results(self) -> ColonyEpisodes:
         rows, totals = self.arrays["worlds"], self.arrays["totals"]
         counts: Arrays = {
-            **{row.name.lower(): totals[row] for row in TOTALS},
+            **{row.name.lower(): totals[row] for row in layout.TOTALS},
             "waiting_births": self._of_nests(NestRow.STORE).sum(axis=1, dtype=np.int32),
             **{row.name.lower(): rows[row] for row in WorldRow if row >= WorldRow.TICKS},
         }
@@ -377,7 +337,7 @@ class ColonyState:
         """
         pheromone = self.pheromones[number]
         falls = pheromone.evaporation == "linear" and not pheromone.dense
-        stored = self._part(array_of(number, pheromone.dense), world)
+        stored = self._part(layout.array_of(number, pheromone.dense), world)
         return stored, int(self.episode_ticks[world]) * falls
 
     def _check_begun(self) -> None:
@@ -419,9 +379,9 @@ class ColonyState:
         made = {name: array.copy() for name, array in self.at_start.items()}
         made |= self._pheromone_arrays(len(self.worlds) * self.grid.size)
         dense = self._model.dense_by_number[0]  # of the trail; the other array is not in use
-        made[array_of(0, not dense)] = np.zeros(1, np.int32 if dense else np.float32)
+        made[layout.array_of(0, not dense)] = np.zeros(1, np.int32 if dense else np.float32)
         for dtype in ("i4", "i1", "f4"):
-            used = [array.name for array in columns_of(self._model) if array.dtype == dtype]
+            used = [array.name for array in layout.columns_of(self._model) if array.dtype == dtype]
             # One allocation, because columns at equal offsets in pages slow each other down.
             columns = np.zeros((len(used), len(self.worlds) * self.capacity), dtype)
             made |= zip(used, columns, strict=True)
@@ -435,11 +395,6 @@ class ColonyState:
         # No call is between the two statements, so Ctrl-C does not separate them.
         self.delivered[which] += deliveries[which]
         deliveries[which] = 0
-
-    def _set_task(self, task: Task) -> None:
-        """Set a task for which the colony has the right arrays and kernels."""
-        self.task, self.pheromones = task, task.pheromones_while(self.learns)
-        self.arrays |= self._settings()
 
     def _stop(self, which: np.ndarray) -> None:
         """End the episode of some worlds, bool (W,), which then wait for their next episode."""
@@ -455,7 +410,6 @@ class ColonyState:
         first_streams[worlds, self.numbers[worlds, slots]] = self.streams[worlds, slots]
 
     def _set_learning_rate(self, learning_rate: float) -> None:
-        """Set the learning rate and the update weights."""
         self.learning_rate = learning_rate
         weights, kept = self._update_weights(learning_rate), self.arrays["weights"]
         if len(weights) > len(kept):  # rare, because Taichi leaks some bytes for each new array
@@ -479,7 +433,7 @@ class ColonyState:
     @property
     def _near_bits(self) -> int:
         """The number of the lowest bits of a cell's number that do not matter to the order."""
-        return max(0, self.grid.size.bit_length() - SORTED_BITS)
+        return max(0, self.grid.size.bit_length() - layout.SORTED_BITS)
 
     def _sort_ants(self) -> None:
         """Sort the ants of a world roughly by cell, so that neighbours share caches."""
@@ -520,7 +474,7 @@ class ColonyState:
             self.first |= feature.columns(self)
         ground, of_cells = self._of_each(World.ground), self._of_each(World.kinds_by_cell)
         is_food = ground == FOOD
-        marks = (ANT_GROUND - (nests << 4)).astype(np.uint8)
+        marks = (layout.ANT_GROUND - (nests << 4)).astype(np.uint8)
         np.put_along_axis(ground, cells.astype(np.int64), marks, axis=1)
         levels = self._of_each(World.trail_levels)
         levels = levels if levels.any() else levels[:, :1].copy()  # all cells are equal
@@ -537,7 +491,7 @@ class ColonyState:
             # The clock at which a cell's trail has evaporated; if dense, its level. The same for
             # each further field, which is empty at the start.
             **self._pheromone_arrays(len(worlds)),
-            array_of(0, model.dense_by_number[0]): levels.reshape(-1),
+            layout.array_of(0, model.dense_by_number[0]): levels.reshape(-1),
             "worlds": rows,
             "nests": of_nests,
             **{
@@ -549,7 +503,7 @@ class ColonyState:
                 if array.per != ANT and (feature in model.features or array.always)
             },
             # Sums over all ants in this episode, see `Tally`.
-            "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
+            "totals": np.zeros((len(layout.TOTALS), len(worlds)), np.int64),
             **food_sources.arrays(foods, rows, n_food_sources, self.grid.size),
         }
         for feature in model.features:
@@ -557,9 +511,8 @@ class ColonyState:
                 self.at_start[name][:] = np.where(is_food, values, 0).reshape(-1)
 
     def _pheromone_arrays(self, n: int) -> Arrays:
-        """Return empty arrays (n,) of all pheromones."""
         return {
-            array_of(number, dense): np.zeros(n, np.float32 if dense else np.int32)
+            layout.array_of(number, dense): np.zeros(n, np.float32 if dense else np.int32)
             for number, dense in enumerate(self._model.dense_by_number)
         }
 
@@ -575,7 +528,6 @@ class ColonyState:
                 slots[which, :n] = np.broadcast_to(starts[name], (shape[0], n))[which]
 
     def _lasting(self, q_values: np.ndarray | None) -> Arrays:
-        """Return the arrays that last through all episodes."""
         slots, memory, n_worlds = self.capacity, self.memory, len(self.seeds)
         owners = n_worlds * self._owners
         sizes = ((1 + memory.tables) * self.task.n_states * ROW, memory.floats, memory.integers)
@@ -627,7 +579,7 @@ class ColonyState:
         n_worlds, rows, touched = len(self.seeds), self._shared_rows, self._shared_rows * ROW + 1
         chunks = sums = n_worlds * self.chunks
         if self.schedule != "by_world":
-            sums, touched = n_worlds + chunks, TOUCHED_LINE * -(-rows // TOUCHED_LINE)
+            sums, touched = n_worlds + chunks, layout.TOUCHED_LINE * -(-rows // layout.TOUCHED_LINE)
         pairs, cells = max(1, sums * rows * ROW), n_worlds * self.grid.size
         by_ant, plans = self.schedule == BY_ANT, self._model.plans_together
         return {
@@ -647,14 +599,14 @@ class ColonyState:
                 if number and dense
             },
             "orders": np.array([self.chunks * (one == Order.CHUNKS) for one in Order], np.int32),
-            "barrier": np.zeros(BARRIER_SIZE, np.int64),  # see `barrier`
-            "tallies": np.zeros(chunks * TALLY_WIDTH, np.int64),
-            "delivered": np.zeros(chunks * NESTS_BY_KINDS, np.int32),  # by nest and kind
+            "barrier": np.zeros(layout.BARRIER_SIZE, np.int64),  # see `barrier`
+            "tallies": np.zeros(chunks * layout.TALLY_WIDTH, np.int64),
+            "delivered": np.zeros(chunks * layout.NESTS_BY_KINDS, np.int32),  # by nest and kind
             # See `learning`: fixed-point sums of TD errors, the last error, and `SumRow`; by world
             # if there are chunks, and by chunk.
             "sums": np.zeros(pairs, np.int64),
             "errors": np.zeros(pairs, np.float32),
-            "sums_of": np.zeros((len(SumRow), pairs), np.int32),
+            "sums_of": np.zeros((len(layout.SumRow), pairs), np.int32),
             "touched": np.zeros(max(1, sums * touched), np.int32),
             **dict.fromkeys(["latest"] * by_ant, np.zeros(pairs if plans else 1, np.int64)),
         }
@@ -671,7 +623,6 @@ class ColonyState:
         return settings
 
     def _ground_constants(self) -> Arrays:
-        """Return the constants that depend on the world."""
         return {
             # 1 for rocks and outside.
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
@@ -700,7 +651,6 @@ class ColonyState:
     # Files
 
     def _contents(self) -> tuple[dict[str, Any], Arrays]:
-        """Return the contents of a file: facts and arrays."""
         arrays = {f"array_{name}": self.arrays[name] for name in self.stored}
         places = {world: place for place, world in enumerate(dict.fromkeys(self.worlds))}
         facts = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property, partial
 from typing import Any
 
@@ -242,7 +242,6 @@ class TickingColony(ColonyState):
             yield
 
     def _advance(self, n: int) -> None:
-        """Advance the colony by n ticks."""
         if self.schedule == BY_ANT:
             self._advance_by_ant(n)
             return
@@ -250,7 +249,7 @@ class TickingColony(ColonyState):
         n_worlds, running = len(self.seeds), runtime.start().threads
         if self.schedule == "by_world":
             threads = min(running, n_worlds)
-            self._launch_ticks(n, parts=threads * -(-n_worlds // threads), threads=threads)
+            self._launch_parts("ticks", n, threads * -(-n_worlds // threads), threads)
             return
         interval = _STEPS_BETWEEN_SORTS // (n_worlds * self.capacity)
         interval = max(_FEWEST_TICKS, min(_MOST_TICKS, interval))
@@ -261,15 +260,15 @@ class TickingColony(ColonyState):
             if self.ticks % interval == 0 and self._can_sort:
                 self._sort(threads)
             compiled, began = "ticks" in self._launches, time.perf_counter()
-            self._launch_ticks(piece, threads)
+            self._launch_parts("ticks", piece, threads)
             if compiled:
                 self._choice.note(piece, threads, time.perf_counter() - began)
 
     def _advance_by_ant(self, n: int) -> None:
         """Advance by n ticks of one or several launches each."""
-        from taichi_ants.engines.colony import kernels
-
-        names = kernels.launches_of_tick(self._variant, self.training.planning_steps)
+        names = ["tick"]
+        if self._model.plans_together:
+            names = ["first", *["planning"] * self.training.planning_steps, "last"]
         ready, self.ready = self.ready, np.zeros_like(self.ready)  # in case of Ctrl-C
         self._launch_by_ant(names * n)
         self.ticks += n
@@ -304,28 +303,28 @@ class TickingColony(ColonyState):
         if self.schedule == BY_ANT:
             self._launch_by_ant([name])
             return
-        # The caller may have reset Taichi, or forked the process.
-        runtime.check_on_cpu(runtime.start(), f"the schedule {self.schedule!r} runs")
+        running = runtime.start()  # the caller may have reset Taichi, or forked the process
+        if running.arch != "cpu":  # on a GPU, threads cannot wait for each other
+            raise AntsError(
+                f"arch is {running.arch!r}, but the schedule {self.schedule!r} runs only on the "
+                "CPU; use arch='cpu'."
+            )
         if name not in self._launches:
+            from taichi_ants.engines.colony import kernels, sorting
             from taichi_ants.engines.launch import Launch
 
-            self._launches[name] = Launch(self._kernel_of(name))
+            kernel_of = partial(kernels.once, self._variant, name)
+            if name == "sort":
+                kernel_of = partial(sorting.sort, self._columns())
+            elif name == "ticks":
+                kernel_of = partial(kernels.ticks, self._variant)
+            self._launches[name] = Launch(kernel_of)
         values = {**kernel_numbers(self), **self.arrays}
         if name == "sort":
             read = "n_worlds", "n_slots", "orders", "barrier", *self._columns()
             values = {name: values[name] for name in read}
             values |= {"near_bits": self._near_bits, **self._scratch}
         self._launches[name](values)
-
-    def _kernel_of(self, name: str) -> Callable[[Any], Any]:
-        """Return a function that makes a kernel for a type of arguments."""
-        from taichi_ants.engines.colony import kernels, learning, sorting
-
-        if name == "sort":
-            return partial(sorting.sort, self._columns())
-        if name == "ticks":
-            return partial(kernels.ticks, self._variant)
-        return partial(kernels.once, self._variant, getattr(learning, name))
 
     @property
     def _variant(self) -> Any:
@@ -339,10 +338,6 @@ class TickingColony(ColonyState):
 
         n_worlds = len(self.seeds)
         return sorting.scratch(n_worlds * self.capacity, n_worlds * self.chunks)
-
-    def _launch_ticks(self, n: int, parts: int, threads: int = 1) -> None:
-        """Advance by n ticks in one launch."""
-        self._launch_parts("ticks", n, parts, threads)
 
     def _launch_parts(self, name: str, n: int, parts: int, threads: int = 1) -> None:
         """Launch a kernel with several parts, and again if the first one gave up at a barrier."""
@@ -364,7 +359,6 @@ class TickingColony(ColonyState):
 
 
 def kernel_numbers(state: ColonyState) -> dict[str, Any]:
-    """Return the numbers that kernels read in addition to arrays."""
     memory, fields = state.memory, state.task.fields.values()
     of_fields: dict[str, float] = {}
     if fields:

@@ -38,7 +38,6 @@ from taichi_ants.task.rules import actions, conflicts, policy, vision
 
 @function
 def state_index_of(c, v, ant):
-    """Return the state index of an ant."""
     state = trait(c.paper_state, ant)
     if ti.static(not v.sees_paper_state):
         state = c.state[ant]
@@ -379,7 +378,6 @@ def draw_cell(c, v, cues, w, ant, state, paper_state, tick, bits):
 
 @function
 def executed_by(c, v, ant):
-    """Return the action that an ant executes in this tick."""
     action = 0
     if ti.static(v.slips):
         action = trait(c.executed, ant)
@@ -465,7 +463,6 @@ def resolve(c, v, w, chunk, ant, tick):
 
 @function
 def step_ahead(c, ant):
-    """Return the index step to the cell ahead of an ant."""
     return actions.step_towards(c.compass, trait(c.heading, ant), FORWARD)
 
 
@@ -490,7 +487,6 @@ def event_of(c, v, w, ant, tick):
 
 @function
 def is_better(c, v, cues, w, ant, ahead, here, tick):
-    """Return whether the cell ahead of an ant is better than its own cell, by its cues."""
     better = is_stronger(ti.static(v.field(c, cues.outbound)), ahead, here, tick)
     if trait(c.carries, ant) == 1:
         if ti.static(cues.has_sense):
@@ -662,7 +658,6 @@ def count_apart(c, v, ant, chunk):
 
 @function
 def reward_of(c, v, ant):
-    """Return the reward of an ant for its last action, i32."""
     reward = 0
     if ti.static(v.has_own_reward):
         reward = c.reward[ant]

@@ -9,14 +9,8 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.engines.layout import (
-    EXTRA_CELLS,
-    TRUNCATED,
-    Command,
-    join,
-    split,
-    unpack_cells,
-)
+from taichi_ants.engines import layout
+from taichi_ants.engines.layout import EXTRA_CELLS, TRUNCATED, Command
 from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.features import used_by
 from taichi_ants.grid.constants import STREAM_ANT
@@ -79,7 +73,7 @@ class BatchedEnvironments:
         }
         # A launch takes 0.4 microseconds for each array and 0.13 for each number, so a step has a
         # single array. The numbers are first, and random states have an even place.
-        self._joined = join(
+        self._joined = layout.join(
             {
                 "numbers": np.zeros(_MOST_NUMBERS, np.int32),
                 "random_states": np.zeros(2 * n, np.int32),
@@ -105,7 +99,7 @@ class BatchedEnvironments:
 
     def _view(self) -> None:
         """Make the views of the memory, and the arguments of kernels."""
-        self.arrays, memory = split(self._joined), self._joined["memory"]
+        self.arrays, memory = layout.split(self._joined), self._joined["memory"]
         self.arrays["random_states"] = self.arrays["random_states"].view(np.uint64)
         self.arrays["cells"] = memory[self._numbers["cells_at"] :]
         self._given = memoryview(memory[self._joined["taken_at"] :][:2])  # "taken", "commands"
@@ -253,7 +247,7 @@ class BatchedEnvironments:
         self._fetch_cells()
         arrays, grid = self.arrays, self.worlds[0].grid
         own = self._numbers["shared_cells"] + number * (grid.size + EXTRA_CELLS)
-        ground, levels = unpack_cells(arrays["cells"][own : own + grid.size])
+        ground, levels = layout.unpack_cells(arrays["cells"][own : own + grid.size])
         trail = np.maximum(levels - arrays["steps"][number] * self._numbers["evaporates"], 0)
         one = slice(number, number + 1)
         cells, headings = arrays["ant_cells"][one].copy(), arrays["headings"][one].copy()

@@ -16,17 +16,8 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners, runtime
-from taichi_ants.engines.layout import (
-    EPSILON_DECAY,
-    EXTRA_CELLS,
-    N_SETTINGS,
-    OUTCOMES,
-    SETTINGS,
-    STEPS,
-    TRACE,
-    compass_of,
-    pack_cells,
-)
+from taichi_ants.engines import layout
+from taichi_ants.engines.layout import EXTRA_CELLS, OUTCOMES, TRACE
 from taichi_ants.features import numbers
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state, words_of
@@ -42,7 +33,8 @@ Progress = Callable[[float], None]  # called with the share of the work that is 
 _SECONDS = 1.0
 _FEW_STEPS = 500_000  # of a run
 _TOGETHER = set[Any]()  # rules and learners of which several runs were done together
-# Vectors gather numbers from memory fast on Intel's processors, but slower than loops on AMD's.
+# Lanes need vectors that gather numbers from memory, which compiled kernels have for Intel's
+# processors. Taichi's LLVM 15 does not know AMD's Zen 5, and makes vectors of four numbers for it.
 GATHERS = "Intel" in runtime.processor()
 _STEP_NS = 25  # a step of Q-learning on one thread of a slow core
 _WORKSPACE_BYTES = 256 * 2**20
@@ -126,10 +118,10 @@ def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]
         **numbers(task),
         # For each world: packed cells and all trails (also under food) at the start of an episode;
         # per cell a bit for each heading that leads nearer to the queen.
-        "world": np.concatenate([pack_cells(world) for world in worlds]),
+        "world": np.concatenate([layout.pack_cells(world) for world in worlds]),
         "trails": np.concatenate([world.trail_levels() for world in worlds]),
         "closer": np.concatenate([world.closer() for world in worlds]),
-        "compass": compass_of(grid),  # see `rules.actions`
+        "compass": layout.compass_of(grid),  # see `rules.actions`
     }
 
 
@@ -172,7 +164,8 @@ class Runs:
         learner = learners.get(configs[0].learner)
         more = learner.settings(configs[0])
         settings = [
-            (*(getattr(config, name) for name in SETTINGS), *astuple(more)) for config in configs
+            (*(getattr(config, name) for name in layout.SETTINGS), *astuple(more))
+            for config in configs
         ]
         if state is None:
             state = RunState.initial(configs, seeds, task.n_states).part(slice(None))
@@ -201,8 +194,8 @@ class Runs:
         state.epsilon[:] = epsilon
         words = np.array(seeds, dtype=object)
         streams = stream_state(words_of(words)[:, None], STREAM_ROLLOUT, np.array(numbers)[None, :])
-        settings = np.zeros((len(tables), N_SETTINGS))
-        settings[:, EPSILON_DECAY] = 1.0
+        settings = np.zeros((len(tables), layout.N_SETTINGS))
+        settings[:, layout.EPSILON_DECAY] = 1.0
         return cls(world, task, max_steps, None, words, settings, state, streams)
 
     def __len__(self) -> int:
@@ -336,7 +329,7 @@ class Runs:
             outcomes = np.zeros((len(OUTCOMES), n_runs, n_episodes), np.int32)
             arrays = {"trace": trace, "trace_errors": errors, "trace_chances": chances}
             launch(runs, part, outcomes=outcomes, **arrays, **keeps)
-            steps_of_run = outcomes[STEPS].sum(axis=1)
+            steps_of_run = outcomes[layout.STEPS].sum(axis=1)
             taken = (np.arange(capacity) < steps_of_run[:, None]).reshape(-1)
             columns = dict(zip(TRACE, trace[taken].T, strict=True))
             columns["episodes"] += part.start

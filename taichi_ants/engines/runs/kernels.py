@@ -4,8 +4,8 @@ The data of a run (cells, Q table, memory) are small enough for the processor's 
 
 A task has a lane for each of its runs, and does each part of a step for all lanes in a loop. Loops
 without branches become vector instructions, with which a step of Q-learning takes two thirds of the
-time. Parts that have branches, or that write where other runs could read, are in separate loops.
-When no run is left for a lane, its ant goes on, but nothing is written.
+time on an Intel Xeon. Parts that have branches, or that write where other runs could read, are in
+separate loops. When no run is left for a lane, its ant goes on, but nothing is written.
 """
 
 from collections.abc import Callable
@@ -17,32 +17,11 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, below, bits_of, high_word, low_word
+from taichi_ants.engines import layout
 from taichi_ants.engines.launch import has_guards
-from taichi_ants.engines.layout import (
-    DELIVERIES,
-    DISCOUNT,
-    EPSILON_DECAY,
-    EXTRA_CELLS,
-    LEARNING_RATE_DECAY,
-    MIN_EPSILON,
-    MIN_LEARNING_RATE,
-    N_SETTINGS,
-    OUTCOMES,
-    RETURNS,
-    STEPS,
-)
-from taichi_ants.engines.runs.step import (
-    Ant,
-    Rules,
-    act,
-    ant_view,
-    exchanges,
-    laid_behind,
-    move,
-    observe_function,
-    pick_up_or_give,
-    restore,
-)
+from taichi_ants.engines.layout import N_SETTINGS
+from taichi_ants.engines.runs import step
+from taichi_ants.engines.runs.step import Ant, Rules, ant_view
 from taichi_ants.features import hooks_at
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner
@@ -109,7 +88,7 @@ def run_kernel(
     columns = N_SETTINGS + len(fields(hyperparameters))
     # A single lane has branches, which are faster where a learned policy repeats actions.
     alone, deposit = n_lanes == 1, rules.deposit
-    observe, executes = observe_function(rules, alone), hooks_at(rules.features)["execute"]
+    observe, executes = step.observe_function(rules, alone), hooks_at(rules.features)["execute"]
     draw, chance_of_draw = BY_VALUES.get(rules.choice, (None, None))
     by_one = alone or draw is not None  # whether ants choose one after the other
     # Whether an episode in which no random number mattered is equal to all others of the run.
@@ -122,7 +101,6 @@ def run_kernel(
 
     @ti.func
     def ant_of(lanes: ti.template(), k):
-        """Return the ant in lane k."""
         return Ant(
             cell=lanes.cell[k],
             heading=lanes.heading[k],
@@ -134,7 +112,6 @@ def run_kernel(
 
     @ti.func
     def keep(lanes: ti.template(), k, ant):
-        """Make `ant` the ant in lane k."""
         lanes.cell[k], lanes.heading[k] = ant.cell, ant.heading
         lanes.carries[k], lanes.carried[k] = ant.carries, ant.carried
         lanes.event[k], lanes.random_state[k] = ant.event, ant.random_state
@@ -199,8 +176,8 @@ def run_kernel(
             lanes.settings[k] = run * columns
             lanes.floats[k] = run * a.floats_by_8 * 8 & _PLACES
             lanes.integers[k] = run * a.integers_by_8 * 8 & _PLACES
-            lanes.discount[k] = ti.cast(a.settings[run * columns + DISCOUNT], ti.f32)
-            restore(a, base, 0, 0, a.size - 1)
+            lanes.discount[k] = ti.cast(a.settings[run * columns + layout.DISCOUNT], ti.f32)
+            step.restore(a, base, 0, 0, a.size - 1)
         if ti.static(not learns):
             lanes.random_state[k] = a.streams[run * a.n_episodes + lanes.episode[k]]
         if ti.static(begins):
@@ -228,7 +205,6 @@ def run_kernel(
 
     @ti.func
     def record_choice(a: ti.template(), lanes: ti.template(), k, executed):
-        """Record what is known of a step before the action."""
         row = lanes.recorded[k]
         a.trace_chances[row] = lanes.chance[k]
         a.trace[row, 0], a.trace[row, 1] = lanes.episode[k], lanes.step[k]
@@ -238,7 +214,6 @@ def run_kernel(
 
     @ti.func
     def record_result(a: ti.template(), lanes: ti.template(), k):
-        """Record the rest of a step."""
         row, event = lanes.recorded[k], lanes.event[k]
         a.trace[row, 7], a.trace[row, 8] = a.rewards[event], lanes.paper_state[k]
         a.trace[row, 9], a.trace[row, 10] = lanes.next_state[k], lanes.terminated[k]
@@ -255,11 +230,11 @@ def run_kernel(
         """Let the ant in lane k deposit, pick up and give, after `move`."""
         ant, base, clock = ant_of(lanes, k), lanes.base[k], lanes.clock[k]
         if ti.static(deposit != NONE):  # no branch, because it could not be predicted
-            laid = laid_behind(deposit, a, base, ant, clock)
+            laid = step.laid_behind(deposit, a, base, ant, clock)
             a.cells[base + ant.cell] = ti.select(lanes.lays[k] == 1, laid, a.cells[base + ant.cell])
         if lanes.exchanges[k] != 0:
             seen, executed = lanes.paper_state[k], lanes.executed[k]
-            after = pick_up_or_give(deposit, a, base, ant, seen, executed, clock)
+            after = step.pick_up_or_give(deposit, a, base, ant, seen, executed, clock)
             lanes.drawn[k] |= ti.cast(after.random_state != ant.random_state, ti.i32)
             keep(lanes, k, after)
 
@@ -280,16 +255,16 @@ def run_kernel(
                 record_choice(a, lanes, k, executed)
             if ti.static(alone):
                 before = ant.random_state
-                ant = act(
+                ant = step.act(
                     *(deposit, True, a, lanes.base[k], ant),
                     *(lanes.paper_state[k], executed, lanes.clock[k]),
                 )
                 if ti.static(repeats):
                     lanes.drawn[k] |= ti.cast(ant.random_state != before, ti.i32)
             else:
-                ant, enters = move(a, ant, lanes.paper_state[k], executed)
+                ant, enters = step.move(a, ant, lanes.paper_state[k], executed)
                 lanes.lays[k] = enters & ant.carries
-                lanes.exchanges[k] = exchanges(lanes.paper_state[k], executed)
+                lanes.exchanges[k] = step.exchanges(lanes.paper_state[k], executed)
                 lanes.executed[k] = executed
                 lays = lanes.lays[k] == 1
                 lanes.first[k] = ti.min(lanes.first[k], ti.select(lays, ant.cell, a.size))
@@ -357,7 +332,6 @@ def run_kernel(
 
     @ti.func
     def rates_of(a: ti.template(), lanes: ti.template(), k):
-        """Return the rates of the run in lane k."""
         return read(
             *(lanes.learning_rate[k], lanes.discount[k], lanes.epsilon[k]),
             *(a.settings, lanes.settings[k] + N_SETTINGS),
@@ -365,7 +339,6 @@ def run_kernel(
 
     @ti.func
     def taken_in(a: ti.template(), lanes: ti.template(), k):
-        """Return the step that was taken in lane k."""
         return Transition(
             state=lanes.state[k],
             action=lanes.action[k],
@@ -380,25 +353,27 @@ def run_kernel(
     def end_episode(a: ti.template(), lanes: ti.template(), k):
         """Write the results of an episode, and take another run after the last one."""
         run, episode, base = lanes.run[k], lanes.episode[k], lanes.base[k]
-        a.outcomes[RETURNS, run, episode] = lanes.total[k]
-        a.outcomes[STEPS, run, episode] = lanes.step[k]
-        a.outcomes[DELIVERIES, run, episode] = ti.cast(lanes.event[k] == Event.DELIVERED, ti.i32)
+        a.outcomes[layout.RETURNS, run, episode] = lanes.total[k]
+        a.outcomes[layout.STEPS, run, episode] = lanes.step[k]
+        a.outcomes[layout.DELIVERIES, run, episode] = ti.cast(
+            lanes.event[k] == Event.DELIVERED, ti.i32
+        )
         first = ti.min(lanes.first[k], a.cells[base + a.size])
-        restore(a, base, 0, first, ti.max(lanes.last[k], a.cells[base + a.size + 1]))
+        step.restore(a, base, 0, first, ti.max(lanes.last[k], a.cells[base + a.size + 1]))
         settings = run * columns
         a.epsilon[run] = ti.max(
-            a.settings[settings + MIN_EPSILON],
-            a.epsilon[run] * a.settings[settings + EPSILON_DECAY],
+            a.settings[settings + layout.MIN_EPSILON],
+            a.epsilon[run] * a.settings[settings + layout.EPSILON_DECAY],
         )
         a.learning_rate[run] = ti.max(
-            a.settings[settings + MIN_LEARNING_RATE],
-            a.learning_rate[run] * a.settings[settings + LEARNING_RATE_DECAY],
+            a.settings[settings + layout.MIN_LEARNING_RATE],
+            a.learning_rate[run] * a.settings[settings + layout.LEARNING_RATE_DECAY],
         )
         lanes.episode[k] = episode + 1
         if ti.static(repeats):
             if lanes.drawn[k] == 0:
                 for later in range(episode + 1, a.n_episodes):
-                    for kind in ti.static(range(len(OUTCOMES))):
+                    for kind in ti.static(range(len(layout.OUTCOMES))):
                         a.outcomes[kind, run, later] = a.outcomes[kind, run, episode]
                 lanes.episode[k] = a.n_episodes
         if lanes.episode[k] == a.n_episodes:
@@ -414,7 +389,7 @@ def run_kernel(
             lanes, ends, active = empty_lanes(), n_lanes, 1
             for k in range(n_lanes):
                 run = task + k * a.n_tasks
-                lanes.run[k], lanes.base[k] = run, run * (a.size + EXTRA_CELLS)
+                lanes.run[k], lanes.base[k] = run, run * (a.size + layout.EXTRA_CELLS)
                 lanes.recorded[k] = run * a.n_episodes * a.max_steps
                 lanes.ended[k] = 1
             while active > 0:

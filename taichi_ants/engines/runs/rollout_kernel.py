@@ -16,16 +16,8 @@ import taichi as ti
 from taichi_ants.arithmetic.random_bits import advance, bits_of, high_word, joined, low_word
 from taichi_ants.engines.launch import has_guards
 from taichi_ants.engines.layout import EXTRA_CELLS, TERMINATED, TRUNCATED, Command
-from taichi_ants.engines.runs.step import (
-    Ant,
-    Rules,
-    act,
-    ant_view,
-    observe_function,
-    parts_of,
-    reason_of,
-    restore,
-)
+from taichi_ants.engines.runs import step
+from taichi_ants.engines.runs.step import Ant, Rules, act, ant_view, parts_of
 from taichi_ants.features import hooks_at
 from taichi_ants.task.constants import PICK_UP, Event, Reason
 from taichi_ants.task.rules.actions import step_end
@@ -60,7 +52,7 @@ def rollout_kernel(
     longer. `numbers` are the arguments that are in an array, see `parts_of`. Each ant draws from
     its stream in the order of a colony's.
     """
-    deposit, observe, single = rules.deposit, observe_function(rules, True), width == 0
+    deposit, observe, single = rules.deposit, step.observe_function(rules, True), width == 0
     executes = hooks_at(rules.features)["execute"]
     by_ant = has_guards(arguments) and not single
 
@@ -119,7 +111,7 @@ def rollout_kernel(
                 ant = act(deposit, False, a, into, ant, paper_state, executed, steps * a.evaporates)
                 event = ant.event
                 if ti.static(single):
-                    reason = reason_of(a, into, before, ant, executed)
+                    reason = step.reason_of(a, into, before, ant, executed)
                 if event == Event.PICKED_UP:  # the store keeps this a branch, which is faster
                     a.changed[i] = 1
                     base = own
@@ -141,7 +133,7 @@ def rollout_kernel(
             seen = state
             if begins == 1:
                 if base == own:
-                    restore(a, own, origin, a.cells[own + a.size], a.cells[own + a.size + 1])
+                    step.restore(a, own, origin, a.cells[own + a.size], a.cells[own + a.size + 1])
                     a.changed[i] = 0
                 stream = ant.random_state
                 ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])

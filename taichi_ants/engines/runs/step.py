@@ -9,26 +9,16 @@ from taichi.lang.impl import subscript
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import draw_below
-from taichi_ants.engines.views import encode_function, fill_codes, view_type
+from taichi_ants.engines.views import fill_codes, view_type
 from taichi_ants.features import NUMBERS, hooks_at, used_by
 from taichi_ants.features.feature import Feature
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.kernel_functions import Named, while_compiling
+from taichi_ants.kernel_functions import Named, kernel_function, while_compiling
 from taichi_ants.task import Task
 from taichi_ants.task.constants import FOOD, FORWARD, LEFT, PICK_UP, QUEEN, RIGHT, Event, Reason
 from taichi_ants.task.observations import Observation
-from taichi_ants.task.rules import vision
-from taichi_ants.task.rules.actions import (
-    MOVES,
-    can_give,
-    heading_after_delivery,
-    is_open,
-    move_event,
-    step_towards,
-    turn,
-    turn_round,
-    turned_by,
-)
+from taichi_ants.task.rules import actions, vision
+from taichi_ants.task.rules.actions import is_open, move_event, step_towards, turned_by
 from taichi_ants.task.rules.pheromone import FADING, NONE, level_after_deposit, level_left
 from taichi_ants.task.rules.policy import bit_number, lowest_bit_number
 
@@ -194,7 +184,7 @@ def observe_function(rules: Rules, predictable: bool) -> Callable[..., Any]:
     in_view = observation.cells
     left, forward, right = observation.ahead
     sees = hooks_at(rules.features)["see"]
-    view_of, encode = view_type(observation, False), encode_function(observation)
+    view_of, encode = view_type(observation, False), kernel_function(observation.encode)
 
     @ti.func
     def see(a: ti.template(), base, ant, clock):
@@ -252,7 +242,7 @@ def act(
     code = vision.code_in_view(paper_state, action)
     if ti.static(predictable):
         if action <= RIGHT:
-            after.heading = turn(a.compass, ant.heading, action)
+            after.heading = actions.turn(a.compass, ant.heading, action)
             after.event = move_event(code)
             if is_open(code):
                 after.cell += step_towards(a.compass, after.heading, FORWARD)
@@ -278,7 +268,7 @@ def move(a: ti.template(), ant, paper_state, action):
     Another action is a `FAILED` one, unless `pick_up_or_give` follows.
     """
     after, code = ant, vision.code_in_view(paper_state, action)
-    moves = MOVES >> action & 1
+    moves = actions.MOVES >> action & 1
     enters = moves & ti.cast(is_open(code), ti.i32)
     after.heading = turned_by(a.compass, ant.heading, action)
     after.event = ti.select(moves == 1, move_event(code), Event.FAILED)
@@ -304,7 +294,6 @@ def laid_behind(deposit: ti.template(), a: ti.template(), base, ant, clock):
 
 @ti.func
 def lay_behind(deposit: ti.template(), a: ti.template(), base, cell, clock, carried):
-    """Deposit on the cell that an ant with food has entered."""
     if ti.static(deposit != NONE):
         lay(deposit, a, base, cell, clock, a.cells[base + cell], carried)
 
@@ -325,12 +314,12 @@ def pick_up_or_give(
         if a.regrows == 0:  # else the food grows back before an ant sees the trail under it
             lay(deposit, a, base, food, clock, a.trails[ant.origin + food], 0)
         lay(deposit, a, base, ant.cell, clock, a.cells[base + ant.cell], 0)
-        after.heading = turn_round(ant.heading)
+        after.heading = actions.turn_round(ant.heading)
         after.carries = 1
         after.event = Event.PICKED_UP
-    elif ant.carries == 1 and can_give(action, paper_state):
+    elif ant.carries == 1 and actions.can_give(action, paper_state):
         after.carries = 0
-        after.heading = heading_after_delivery(ant.heading, a.turns_at_queen)
+        after.heading = actions.heading_after_delivery(ant.heading, a.turns_at_queen)
         after.event = Event.DELIVERED
     return after
 

@@ -15,13 +15,7 @@ import numpy as np
 
 from taichi_ants import arguments, runtime
 from taichi_ants.engines.layout import OUTCOMES, TRACE
-from taichi_ants.engines.runs.engine import (
-    MAX_ROLLOUT_STEPS,
-    Progress,
-    Runs,
-    RunState,
-    memory_for,
-)
+from taichi_ants.engines.runs.engine import MAX_ROLLOUT_STEPS, Progress, Runs, RunState, memory_for
 from taichi_ants.engines.runs.results import RolloutArguments, Rollouts, Trace, TrainingResult
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.learners.config import TrainingConfig
@@ -253,7 +247,6 @@ def trace_training(
 
 
 def _check_length(steps: int, most: int) -> None:
-    """Raise AntsError if a trace would be too long."""
     if steps > most:
         raise AntsError(
             f"episodes * max_steps is {steps}; a trace has at most {most} steps, so reduce one of "
@@ -262,7 +255,6 @@ def _check_length(steps: int, most: int) -> None:
 
 
 def _trace(world: World, steps: dict[str, np.ndarray], **more: Any) -> Trace:
-    """Return the trace of recorded steps."""
     columns: dict[str, Any] = {name: steps[name] for name in TRACE}
     columns["cells"] = world.grid.cells(columns["cells"])
     columns["terminated"] = columns["terminated"].astype(bool)

@@ -81,6 +81,5 @@ def epsilon_of(caste: Caste, ant: Ant, default: float) -> float:
 
 
 def lays(task: Task, ant: Ant, name: str) -> bool:
-    """Return whether an ant lays a pheromone."""
     names = [name.strip() for name in caste_of(task, ant).lays.split(",")]
     return names == ["all"] or name in names

@@ -10,7 +10,6 @@ from taichi_ants.task.constants import Event
 
 
 def born(colony: Any, ant: Ant) -> None:
-    """Let an ant begin without food."""
     ant.own["kind"] = 0
 
 
@@ -23,7 +22,6 @@ def filled(colony: Any, cell: Cell, kind: int, n: int) -> int:
 
 
 def took(colony: Any, ant: Ant, cell: Cell, left: int) -> int:
-    """Take a load of food from a cell; return how many are left."""
     food = colony.world.of_cells[cell]
     ant.own["kind"] = food["kind_of"]
     food["loads"] -= 1
@@ -31,7 +29,6 @@ def took(colony: Any, ant: Ant, cell: Cell, left: int) -> int:
 
 
 def dropped(colony: Any, ant: Ant, cell: Cell) -> None:
-    """Leave the food of an ant in its cell."""
     colony.world.of_cells[cell] |= {"kind_of": ant.own["kind"], "loads": 1}
 
 
@@ -42,7 +39,6 @@ def waits(colony: Any, cell: Cell, kind: int, ticks: int | None) -> int | None:
 
 
 def pays(colony: Any, ant: Ant, event: Event, reward: int) -> int:
-    """Return the reward for food by its kind, and that of other events."""
     foods = [*colony.task.foods.values()]
     if foods and event is Event.PICKED_UP:
         return foods[ant.own["kind"]].pick_up

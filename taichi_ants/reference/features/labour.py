@@ -17,7 +17,6 @@ from taichi_ants.task import Threshold
 
 
 def born(colony: Any, ant: Ant) -> None:
-    """Draw the threshold of an ant, which is idle if it has one."""
     threshold = caste_of(colony.task, ant).threshold
     ant.own["threshold"] = draw_threshold(threshold, colony.seed, ant.number)
     ant.own["idle"] = threshold.distribution != "none"
@@ -62,7 +61,6 @@ def choose(colony: Any, ant: Ant) -> bool:
 
 
 def delivered(colony: Any, nest: int, n: int) -> None:
-    """Lower the stimulus of a nest."""
     values, relief = colony.world.of_nests[nest], (colony.task.labour.relief or 0.0) * n
     values["stimulus"] = max(0.0, values["stimulus"] - relief)
 
@@ -79,12 +77,10 @@ def acted(colony: Any, ant: Ant) -> bool:
 
 
 def stopped(colony: Any, ant: Ant) -> None:
-    """Make an ant idle."""
     ant.own["idle"] = True
 
 
 def tick_ended(colony: Any, nest: int) -> None:
-    """Raise the stimulus of a nest."""
     colony.world.of_nests[nest]["stimulus"] += colony.task.labour.demand or 0.0
 
 

@@ -9,7 +9,6 @@ from taichi_ants.reference.features.castes import caste_of
 
 
 def born(colony: Any, ant: Ant) -> None:
-    """Let an ant begin at age 0."""
     ant.own["age"] = 0
 
 

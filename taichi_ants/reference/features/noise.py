@@ -10,7 +10,6 @@ from taichi_ants.task.constants import N_ACTIONS
 
 
 def execute(colony: Any, ant: Ant, action: int) -> int:
-    """Return the action that an ant executes instead of the one it chose."""
     if (slip := colony.task.noise.slip) == 0:
         return action
     high, low = ant.stream.draw()
@@ -18,7 +17,6 @@ def execute(colony: Any, ant: Ant, action: int) -> int:
 
 
 def see(colony: Any, ant: Ant, code: int) -> int:
-    """Return the code that an ant sees instead of the true one."""
     if (misread := colony.task.noise.misread) == 0:
         return code
     high, low = ant.stream.draw()

@@ -58,7 +58,6 @@ def turned_by(compass: ti.template(), heading, action):
 
 @ti.func
 def turn_round(heading):
-    """Return the opposite heading."""
     return ti.select(heading < 3, heading + 3, heading - 3)
 
 
@@ -70,7 +69,6 @@ def is_open(code):
 
 @ti.func
 def move_event(code):
-    """Return the event of a move to a cell with this code."""
     return ti.select(is_open(code), code + Event.ENTERED_EMPTY, Event.BLOCKED)
 
 
@@ -82,13 +80,11 @@ def bit_number_in(compass: ti.template(), mask, k):
 
 @ti.func
 def can_give(action, paper_state):
-    """Return whether an ant with food delivers it: its action is GIVE, and it sees the queen."""
     return (action == GIVE) & (goals_in_view(paper_state) != 0)
 
 
 @ti.func
 def heading_after_delivery(heading, turns_at_queen):
-    """Return the heading of an ant after a delivery."""
     return ti.select(turns_at_queen == 1, turn_round(heading), heading)
 
 

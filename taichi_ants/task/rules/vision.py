@@ -105,12 +105,6 @@ def code_in_view(state, position):
 
 
 @ti.func
-def sees_goal(state):
-    """Return whether a cell in view is food or queen."""
-    return goals_as_seen(state) != 0
-
-
-@ti.func
 def goals_as_seen(state):
     """Return the bits of a state that are set where the code is that of food or queen."""
     return state & (state >> 1) & 21
@@ -143,7 +137,6 @@ def misread_paper_state(paper_state, random_state, hooks: ti.template(), ant: ti
 
 @while_compiling
 def entry_of(view: Any, name: str) -> Any:
-    """Return a vector of a view by its name, while a kernel compiles."""
     return getattr(view, name)
 
 

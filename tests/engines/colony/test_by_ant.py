@@ -13,7 +13,7 @@ import record
 from interrupts import interrupted_after_launch
 
 from taichi_ants import AntsError, Colony, TrainingConfig, runtime, task, worlds
-from taichi_ants.engines.colony import state
+from taichi_ants.engines.colony import layout
 from taichi_ants.engines.colony.layout import BY_ANT, schedule_of
 
 QUICK = "nests", "castes_fields"
@@ -63,7 +63,7 @@ def test_drawn_colonies_have_the_recorded_hashes(group):
 @pytest.mark.parametrize(("ants", "ants_of_place"), [(8, 3), (1000, 1000), (1000, 16)])
 def test_threads_add_to_the_same_sums_in_any_order(ants, ants_of_place, monkeypatch):
     """Also many ants, all into one place."""
-    monkeypatch.setattr(state, "ANTS_OF_PLACE", ants_of_place)
+    monkeypatch.setattr(layout, "ANTS_OF_PLACE", ants_of_place)
     colony, expected = made(ants=ants), made("by_world", ants)
     for one in (colony, expected):
         one.tick(40)

@@ -118,15 +118,6 @@ def test_ants_that_stop_foraging_are_without_food_next_to_their_queen():
     assert stopped > 20
 
 
-def test_a_caste_with_a_policy_does_not_learn():
-    castes = {"learns": {"share": 0.5}, "follows": {"policy": "trail_follower"}}
-    colony = Colony(WORLD, Task(castes=castes), TRAINING, seeds=[0, 1], ants=20)
-    colony.run(1, 50)
-    learned, followed = np.moveaxis(colony.q_values, 1, 0)
-    assert learned.any()
-    assert (followed == trail_follower()).all()
-
-
 def test_a_file_of_a_colony_needs_no_policy_file(tmp_path):
     policy = tmp_path / "policy.npz"
     save_policy(policy, random_policy(), {})

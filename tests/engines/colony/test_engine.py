@@ -8,6 +8,7 @@ import pytest
 from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task import Life, Pheromone, Task, foraging
+from taichi_ants.task.constants import FORWARD
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
 
@@ -90,3 +91,17 @@ def test_an_ant_and_a_cell_take_few_bytes(task, most):
     assert (size(60, 2000) - size(60, 1000)) / 1000 < most
     cells = [worlds.open_world(1, (side,) * 3).grid.size for side in (50, 60)]
     assert (size(60, 1000) - size(50, 1000)) / (cells[1] - cells[0]) < 10
+
+
+def test_a_steep_deposit_after_long_carrying_leaves_nothing():
+    """Slope times ticks does not fit into 32 bits."""
+    world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0)])
+    task = Task(pheromone=Pheromone(deposit="fading", level=250, slope=100))
+    colony = Colony(world, task, None, ants=1, sharing="frozen")
+    colony.begin_episode()
+    colony.arrays["carries"][:] = 1
+    colony.arrays["carried"][:] = 30_000_000
+    colony.arrays["paper_state"][:] = 64  # with food, and three empty cells ahead
+    colony.act(np.array([[FORWARD]]))
+    assert colony.grid.cells(colony.cells[0]).tolist() == [[3, 2, 0]]
+    assert not colony.snapshot().trail.any()

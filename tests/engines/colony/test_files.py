@@ -1,8 +1,10 @@
-"""Colonies in files: what was saved goes on, and what was changed is refused."""
+"""Colonies in files and copies: what was saved goes on, and what was changed is refused."""
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -44,6 +46,26 @@ def test_what_others_have_written_is_not_believed(kept, tmp_path) -> None:
     np.savez(tmp_path / "x.npz", **kept)
     with pytest.raises(AntsError, match=r"is damaged, or not an \.npz file of this version"):
         Colony.load(tmp_path / "x.npz")
+
+
+def test_copies_of_colonies_with_given_actions_go_on_alike(tmp_path):
+    """Also when worlds have begun anew, one of them with another seed."""
+    world, rng = worlds.open_world(5, (9, 8, 7)), np.random.default_rng(1)
+    life = Life(births=True, lifespan=30, regrowth=2, pile_move_interval=9)
+    colony = Colony(world, Task(life=life), None, (3, 4, 5), ants=20, sharing="frozen")
+    colony.begin_episode()
+    colony.act(rng.integers(0, 5, (3, colony.capacity)))
+    colony.reset_worlds(np.array([False, True, False]))
+    colony.reset_worlds(np.array([False, False, True]), [77])
+    others = copy.deepcopy(colony), pickle.loads(pickle.dumps(colony)), reread(colony, tmp_path)
+    for _ in range(40):
+        actions = rng.integers(0, 5, (3, colony.capacity))
+        for one in (colony, *others):
+            one.act(actions)
+    assert all(one.is_given_actions and one == colony for one in others)
+    colony.reset_worlds(np.array([True, False, True]), [9, 9])  # seeds may repeat
+    with pytest.raises(AntsError, match=r"^seeds contains 9 more than once; "):
+        colony.save(tmp_path / "never.npz")
 
 
 @pytest.mark.parametrize(

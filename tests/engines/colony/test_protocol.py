@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plain_interventions import Protocol
 from random_castes import drawn_castes
 from random_choices import NO_NOISE, NOISE
 from random_colonies import mortal, random_colony, with_nests
 from random_protocols import random_protocol
-from same_colonies import assert_equal
+from same_colonies import every_tick_of_protocol
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
 from taichi_ants.engines.colony.interventions import Interventions
@@ -95,30 +94,16 @@ def test_every_tick_of_drawn_protocols_equals_the_reference(kernel):
         schedule = "by_chunk" if by_chunk else "by_world"
         try:
             colony = Colony(places, task, training, seeds, **rules, schedule=schedule)
-            timetable = Timetable(colony, protocol, TICKS)
+            Timetable(colony, protocol, TICKS)
         except AntsError:
             continue
         plains = [
             ReferenceColony(place, task, training, one, **rules)
             for place, one in zip(places, seeds, strict=True)
         ]
-        twins = [Protocol(plain, protocol) for plain in plains]
         try:
-            for _ in range(2):
-                colony.begin_episode(TICKS)
-                for twin in twins:
-                    twin.begin_episode()
-                with timetable:
-                    for tick in range(TICKS):
-                        for _ in timetable.pieces(Colony._pieces, 1):
-                            pass
-                        for w, (plain, twin) in enumerate(zip(plains, twins, strict=True)):
-                            twin.before_tick()
-                            plain.tick(last=tick == TICKS - 1)
-                            assert_equal(colony, plain, w)
-                colony.end_episode()
-                for twin in twins:
-                    twin.end_episode()
+            for _ in every_tick_of_protocol(colony, protocol, plains, TICKS):
+                pass
             done.update(one.path for event in protocol for one in event.interventions)
         except AntsError:
             refused += 1
@@ -143,29 +128,6 @@ def followers(seeds, schedule=None, world=None):
     given = world or worlds.paper(), FORAGING, FOLLOWS, seeds
     rules = {"ants": 20, "sharing": "frozen", "q_values": trail_follower("ants")}
     return Colony(*given, **rules, schedule=schedule)
-
-
-@pytest.mark.slow
-def test_runs_with_a_protocol_do_not_depend_on_other_worlds_or_the_schedule():
-    every = followers(range(4)).run(2, 160, protocol=PROTOCOL)
-    assert followers(range(4), "by_chunk").run(2, 160, protocol=PROTOCOL) == every
-    for seed in (0, 3):
-        alone = followers([seed]).run(2, 160, protocol=PROTOCOL)
-        for name, array in vars(alone).items():
-            if isinstance(array, np.ndarray):
-                assert np.array_equal(array[:, 0], getattr(every, name)[:, seed]), name
-        given = (worlds.paper(), FORAGING, FOLLOWS, seed, 20)
-        plain = ReferenceColony(*given, sharing="frozen", q_values=trail_follower("ants"))
-        twin = Protocol(plain, PROTOCOL)
-        for _ in range(2):
-            twin.begin_episode()
-            for tick in range(160):
-                twin.before_tick()
-                plain.tick(last=tick == 159)
-            twin.end_episode()
-        for name in ("deliveries", "first_delivery", "moves", "blocked"):
-            counts = [getattr(one, name) for one in plain.records]
-            assert counts == getattr(alone, name)[:, 0].tolist()
 
 
 def test_a_run_leaves_no_trace_of_its_protocol():

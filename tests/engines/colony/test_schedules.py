@@ -11,8 +11,8 @@ from types import FunctionType, SimpleNamespace
 import numpy as np
 import pytest
 
-from taichi_ants import Colony, TrainingConfig, train, worlds
-from taichi_ants.engines.colony import barrier, state, stepping
+from taichi_ants import Colony, TrainingConfig, worlds
+from taichi_ants.engines.colony import barrier, layout, stepping
 from taichi_ants.engines.colony.layout import Order
 from taichi_ants.engines.colony.stepping import ThreadChoice
 from taichi_ants.task import Field, Life, Pheromone, Task
@@ -54,7 +54,7 @@ def assert_same(first: dict, second: dict) -> None:
 
 def use_chunks(monkeypatch, n: int) -> None:
     """Let worlds have n chunks, for any number of threads."""
-    monkeypatch.setattr(state, "most_chunks", lambda *sizes: n)
+    monkeypatch.setattr(layout, "most_chunks", lambda *sizes: n)
     monkeypatch.setattr(stepping, "chunks_for", lambda *sizes: n)
 
 
@@ -195,31 +195,3 @@ def test_the_internal_order_of_the_ants_does_not_matter():
     assert np.array_equal(shuffled.arrays["q"], plain.arrays["q"])
     assert np.array_equal(shuffled.arrays["ground"], plain.arrays["ground"])
     assert plain.outcome().blocked[0, 0] > 0
-
-
-@pytest.mark.parametrize(
-    ("learner", "sharing"),
-    [
-        ("dyna_q", "shared"),
-        pytest.param("sarsa", "independent", marks=pytest.mark.slow),
-        pytest.param("double_q", "independent", marks=pytest.mark.slow),
-    ],
-)
-def test_one_ant_equals_the_engine_of_independent_runs(learner, sharing):
-    more = {"planning_steps": 2} if learner == "dyna_q" else {}
-    training = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.95, hyperparameters=more)
-    for delivery in ("terminates", "truncates"):
-        assert_equal_runs(training, Task(delivery=delivery), sharing)
-
-
-def assert_equal_runs(training: TrainingConfig, task: Task, sharing: str) -> None:
-    seeds = (0, 7, -5)
-    expected = train(worlds.paper(), training, seeds, episodes=12, max_steps=150, task=task)
-    ants = Colony(worlds.paper(), task, training, seeds, ends_at_delivery=True, sharing=sharing)
-    outcome = ants.run(12, 150)
-    assert np.array_equal(outcome.returns.T, expected.returns[0])
-    assert np.array_equal(outcome.ticks.T, expected.steps[0])
-    assert np.array_equal(outcome.deliveries.T, expected.deliveries[0])
-    assert outcome.deliveries.sum() > 10
-    assert np.array_equal(ants.q_values.reshape(3, 128, 5), expected.q_values[0])
-    assert np.array_equal(ants.arrays["first_streams"], expected.state.random_states[0])

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, TrainingConfig, World
+from taichi_ants import Colony, TrainingConfig, World
 from taichi_ants.engines.colony.layout import ANT_GROUND
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.reference import ReferenceColony
@@ -191,17 +191,3 @@ def test_a_ring_of_three_ants_stays(traffic):
     colony.act(np.full((1, 3), FORWARD))
     assert colony.arrays["cell"].tolist() == before
     assert int(colony.outcome().blocked[0, 0]) == 3
-
-
-def test_options_that_change_nothing_are_refused():
-    for options, message in (
-        ({"reward_pushed": True}, "leave it out unless `swap` is True"),
-        ({"carriers_first": True}, "carriers_first` is True; leave it out"),
-        ({"swap": "yes"}, "swap` is 'yes'"),
-    ):
-        with pytest.raises(AntsError, match=message):
-            Traffic(**options)
-    with pytest.raises(
-        AntsError, match=r"traffic` is 'left'; it must be .* one of blocking, right_of"
-    ):
-        Task(traffic="left")

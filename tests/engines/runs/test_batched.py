@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from colonies import act, training
+from random_choices import NO_NOISE, NOISE, random_noise
 from random_rewards import random_rewards
 from random_worlds import random_world
 
@@ -15,12 +16,13 @@ from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import GIVE, PICK_UP, Event, Reason
 from taichi_ants.worlds import World, from_text
 
-# Each is a kernel of its own: observation, deposit, view.
+# Each is a kernel of its own: observation, deposit, view, noise.
 KERNELS = [
-    ("paper", "set", "half"),
-    ("six_cells", "add", "strongest"),
-    ("queues", "fading", "strongest_under_carriers"),
-    ("trail_levels", "none", "half"),
+    ("paper", "set", "half", NO_NOISE),
+    ("six_cells", "add", "strongest", NO_NOISE),
+    ("queues", "fading", "strongest_under_carriers", NO_NOISE),
+    ("trail_levels", "none", "half", NOISE),
+    ("paper", "set", "half", NOISE),
 ]
 
 
@@ -35,7 +37,7 @@ def plain(world: World, task: Task, seed: int, ends: str, falls: bool) -> Refere
     )
 
 
-def drawn_task(rng: np.random.Generator, observation: str, deposit: str, view: str) -> Task:
+def drawn_task(rng: np.random.Generator, observation: str, deposit: str, view: str, noise) -> Task:
     more = {"add": {"cap": int(rng.choice([1, 300]))}, "fading": {"slope": int(rng.choice([1, 9]))}}
     pheromone = Pheromone(deposit=deposit, view=view)
     if deposit != "none":
@@ -51,6 +53,7 @@ def drawn_task(rng: np.random.Generator, observation: str, deposit: str, view: s
         random_rewards(int(rng.integers(99))),
         pheromone,
         turns_at_queen=bool(rng.integers(2)),
+        noise=random_noise(int(rng.integers(99)), noise),
     )
 
 
@@ -86,7 +89,7 @@ MARKED = [pytest.param(one, marks=[pytest.mark.long] * (k % 2)) for k, one in en
 @pytest.mark.parametrize("kernel", MARKED, ids="-".join)
 def test_each_step_equals_the_reference(kernel):
     rng = np.random.default_rng(KERNELS.index(kernel))
-    delivered = 0
+    delivered = slipped = 0
     for number in range(6):
         world, ends = (
             random_world(1000 + number),
@@ -121,6 +124,7 @@ def test_each_step_equals_the_reference(kernel):
                 delivered += gave
                 terminated = gave and ends == "terminates"
                 last = colony.record.ticks == max_steps or (gave and ends != "continues")
+                slipped += step.executed != step.action
                 assert arrays["rewards_of"][i] == step.reward
                 succeeds = step.event not in (Event.BLOCKED, Event.FAILED)
                 assert (arrays["reasons"][i] == Reason.NONE) == succeeds
@@ -133,7 +137,8 @@ def test_each_step_equals_the_reference(kernel):
                     colony.begin_episode()
                 check_equal(ants, i, colony, world)
             begins = arrays["results"] >= TRUNCATED
-    assert delivered > 12
+    assert delivered > (4 if kernel[-1] else 12)
+    assert (slipped > 50) == (kernel[-1] == NOISE)
 
 
 BESIDE_FOOD = """
