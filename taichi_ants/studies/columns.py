@@ -5,8 +5,7 @@ docs/reference/files.md shows them, and those of the studies in `experiments/col
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 # In names of columns: what stands for several names, and their form.
@@ -32,11 +31,6 @@ class Table(NamedTuple):
 
     row: str
     columns: Mapping[str, str]
-
-    def undeclared(self, columns: Iterable[str]) -> list[str]:
-        """Return those of the columns that the table does not declare."""
-        forms = [re.sub("|".join(NAMES), lambda m: NAMES[m[0]][0], name) for name in self.columns]
-        return [name for name in columns if not any(re.fullmatch(one, name) for one in forms)]
 
 
 SWEEP = {
