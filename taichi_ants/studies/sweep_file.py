@@ -8,20 +8,12 @@ from dataclasses import fields
 from typing import Any, NamedTuple
 
 from taichi_ants import arguments, interventions, measures, protocol, rules, worlds
+from taichi_ants import settings as declarations
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, refuse, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
 from taichi_ants.measures.measure import RUN
-from taichi_ants.settings import (
-    DeclaredSetting,
-    all_of,
-    declared,
-    flat,
-    named_groups,
-    nested,
-    not_a_setting,
-    settings_of_entry,
-)
+from taichi_ants.settings import DeclaredSetting, declared, flat, named_groups, nested
 from taichi_ants.studies.design import Axis, Design, Range
 from taichi_ants.studies.points import ColonyPoint, Drawn, FixedPolicy, Point, RunPoint
 from taichi_ants.task import Task
@@ -158,7 +150,7 @@ class Base(NamedTuple):
         for name in tree:  # the world, task, training and events check theirs
             if name not in known:
                 of = f"a sweep of kind {self.kind!r}"
-                raise AntsError(f"{name!r} {not_a_setting(name, [*known, *KEYS], of)}")
+                raise AntsError(f"{name!r} {declarations.not_a_setting(name, [*known, *KEYS], of)}")
         preset = task.pop("preset", "paper")
         check_one_of("task.preset", preset, tuple(Task.named()))
         task = Task.named()[preset].replace(**task)
@@ -232,12 +224,12 @@ def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:
     else:
         preset = fixed.get("world.preset", "paper")
         of_world = worlds.registry.settings_of(preset) if preset in worlds.names() else ()
-        known = [*all_of(Task), *declared(TrainingConfig), *of_world]
+        known = [*declarations.all_of(Task), *declared(TrainingConfig), *of_world]
         for named in named_groups(Task):
             entry = re.match(rf"{named.path}\.([^.]+)\.", path)
             # The parameters of rules that are not registered are unknown.
             if entry and (named.path != "task.rules" or entry[1] in rules.names()):
-                known += settings_of_entry(named, entry[1]).values()
+                known += declarations.settings_of_entry(named, entry[1]).values()
     return next((s._replace(path=name) for s in known if s.path == path), None)
 
 
