@@ -32,7 +32,8 @@ from taichi_ants.measures.finished import FINISHED  # noqa: E402
 from taichi_ants.protocol import EVENTS  # noqa: E402
 from taichi_ants.settings import Named, declared  # noqa: E402
 from taichi_ants.studies import command_line  # noqa: E402
-from taichi_ants.studies.sweep_file import KEYS, KINDS, WORLD_KEYS  # noqa: E402
+from taichi_ants.studies.design import Design  # noqa: E402
+from taichi_ants.studies.sweep_file import KEYS, KINDS  # noqa: E402
 from taichi_ants.task import observations  # noqa: E402
 
 
@@ -156,10 +157,11 @@ def sweep_keys(part: str) -> str:
         rows = [[f"`{one.name}`", *one.in_words] for one in own]
         return table(("Key", "Values", "Default", "Meaning"), rows).replace("'", '"')
     else:
-        rows = [
-            [f"`{name}`", about]
-            for name, about in {"file": KEYS, "world": WORLD_KEYS}[part].items()
-        ]
+        meanings = tomllib.loads((REFERENCE / "sweep_keys.toml").read_text("utf-8"))[part]
+        for one in declared(Design) if part == "file" else ():
+            values, default, _ = one.in_words
+            meanings[one.name] = f"{one.rule.help}; {values} (default: {default})"
+        rows = [[f"`{name}`", meanings[name]] for name in (KEYS if part == "file" else meanings)]
     return table(("Key", "Meaning"), rows).replace("`'", '`"').replace("'`", '"`')
 
 

@@ -19,34 +19,11 @@ from taichi_ants.studies.points import ColonyPoint, Drawn, FixedPolicy, Point, R
 from taichi_ants.task import Task
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
-# Keys that are not settings of points; docs/reference/sweep_keys.md shows them.
-KEYS = {
-    "kind": '`"runs"` for lone ants, which are trained and then followed greedily, or `"colony"` '
-    "for many ants in one world, which learn and are then evaluated with frozen action values",
-    "measures": "one or more measures of this kind; figures show the first",
-    "measure_every": 'time between the values in `series.csv`, in ticks; kind `"colony"`, off by '
-    "default",
-    "seeds": "the number of seeds (0, 1, 2 ...), 10 by default, or a list of them",
-    "vary": "the settings that vary: in a table `[vary]`, or in several `[[vary]]`, each with its "
-    "own combinations",
-    "against": "the baseline: a setting of `[vary]` with one of its values",
-    **{
-        key.name: f"{key.rule.help}; {key.in_words[0]} (default: {key.in_words[1]})"
-        for key in declared(Design)
-    },
-}
-# Settings of points whose values are read in another form.
-WORLD_KEYS = {
-    "world.preset": 'a registered name, `"paper"` by default, or the path of a map relative to the '
-    "folder in which you run the command",
-    "world.seed": "the seed of a world that is drawn at random; 0 by default",
-    "world.per_seed": 'draw a world for each seed, from `world.seed` + seed; kind `"colony"`',
-    "world.regions": "regions that the world gets: a list of cells, or `{centre = [x, y, z], "
-    "radius = 3}`, by name",
-    "task.preset": 'the task to start from, `"paper"` by default; other keys of `task` change it',
-    "policy": "with `episodes = 0`, and without `[training]`: the policy that ants follow, a file "
-    '(`"policy.npz"`), `"trail_follower"` or `"random"`',
-}
+# Keys that are not settings of points; docs/reference/sweep_keys.toml has their meanings.
+KEYS = [
+    *("kind", "measures", "measure_every", "seeds", "vary", "against"),
+    *(key.name for key in declared(Design)),
+]
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
 # Measures of reward, and the deliveries that sweeps report beside them: ants can collect rewards
