@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from measuring import Work, a_ratio, machine, pace, publish
+from measuring import Work, a_ratio, machine, pace, show
 from throughput import compile_c, compiler, compiler_note
 
 from taichi_ants import Task, TrainingConfig, runtime, worlds
-from taichi_ants.analysis.tables import Table, figure, interval, plain_text, thousands
+from taichi_ants.analysis.tables import Table, figure, interval, thousands
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.colony.stepping import kernel_numbers
 from taichi_ants.errors import AntsError, count
@@ -201,9 +201,7 @@ def compare(
     with tempfile.TemporaryDirectory() as folder:
         found = measured(load(command, folder, threads), ants, rounds, threads, _SECONDS)
     made = table(found, threads, compiler_note(command, threads))
-    print(plain_text([made], 120), end="")
-    if publishes:
-        publish("performance_colony", [made])
+    show("performance_colony", [made], publishes)
     for (rules, n), paces in found.items():
         ratio = float(np.median(paces[:, 0] / paces[:, 1]))
         if ratio < least:

@@ -12,10 +12,10 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from measuring import machine, publish
+from measuring import machine, show
 
 from taichi_ants import Colony, Task, TrainingConfig, runtime, train, worlds
-from taichi_ants.analysis.tables import MISSING, Table, figure, plain_text, thousands
+from taichi_ants.analysis.tables import MISSING, Table, figure, thousands
 from taichi_ants.envs.forage import HexForageVectorEnv
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import foraging
@@ -157,9 +157,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     def command() -> None:
         given = parser.parse_args(arguments)
         made = table(measured(given.rounds), given.rounds)
-        print(plain_text([made], 120), end="")
-        if given.publish:
-            publish("performance_cores", [made])
+        show("performance_cores", [made], given.publish)
 
     run_command(command)
 

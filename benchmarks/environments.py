@@ -18,10 +18,10 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from measuring import machine, publish
+from measuring import machine, show
 
 from taichi_ants import evaluate, runtime, worlds
-from taichi_ants.analysis.tables import Table, figure, interval, plain_text, thousands
+from taichi_ants.analysis.tables import Table, figure, interval, thousands
 from taichi_ants.errors import count
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.studies.command_line import Parser, run_command, whole_number
@@ -168,9 +168,7 @@ def measure(num_envs: list[int], rounds: int, threads: int | None, publishes: bo
             ("Vector environments", several, ENGINE, notes),
         )
     ]
-    print(plain_text(made, 120), end="")
-    if publishes:
-        publish("performance_environments", made)
+    show("performance_environments", made, publishes)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -22,10 +22,10 @@ from multiprocessing import get_context
 
 import numpy as np
 from cores import COLONIES, Q_LEARNING, colony_of
-from measuring import ROOT, a_ratio, machine, pace, publish
+from measuring import ROOT, a_ratio, machine, pace, show
 
 from taichi_ants import AntsError, Task, runtime, train, worlds
-from taichi_ants.analysis.tables import Table, figure, plain_text
+from taichi_ants.analysis.tables import Table, figure
 from taichi_ants.envs.forage import HexForageVectorEnv, Rollout
 from taichi_ants.studies.command_line import Parser, run_command
 
@@ -246,9 +246,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not given.on_cpu:
             card()
         tables = measured(given.seconds, given.on_cpu, given.only)
-        print(plain_text(tables, 120), end="")
-        if given.publish:
-            publish("performance_gpu", tables)
+        show("performance_gpu", tables, given.publish)
         if any(word in str(tables) for word in ("DIFFERENT", "FAILED")):
             raise AntsError("some parts failed, or differ from those of a CPU.")
 

@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from measuring import FIGURES, Work, machine, pace, publish
+from measuring import FIGURES, Work, machine, pace, show
 from systems.ours import SARSA
 
 from taichi_ants import Task, TrainingConfig, World, runtime, train, worlds
 from taichi_ants.analysis import style
 from taichi_ants.analysis.sweeps import draw_lines
-from taichi_ants.analysis.tables import MISSING, Table, figure, interval, plain_text, thousands
+from taichi_ants.analysis.tables import MISSING, Table, figure, interval, thousands
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import foraging, observations
@@ -286,10 +286,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             SMALL if given.small else DIRECTIONS, given.rounds, 0.3 * (not given.small)
         )
         made = tables(found, memories, given.rounds)
-        print(plain_text(made, 120), end="")
         if given.publish:
             draw(found)
-            publish("performance_growth", made)
+        show("performance_growth", made, given.publish)
 
     run_command(command)
 

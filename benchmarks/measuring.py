@@ -17,7 +17,7 @@ from taichi_ants import runtime
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT / "experiments"))
 from published import FIGURES as FIGURES  # noqa: E402
-from published import publish as publish  # noqa: E402
+from published import show as show  # noqa: E402
 
 Work = Callable[[], int]  # does some work, and returns the number of steps in it
 

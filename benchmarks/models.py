@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from measuring import machine, pace, publish
+from measuring import machine, pace, show
 from systems.ours import SARSA
 
 from taichi_ants import Task, World, runtime, worlds
-from taichi_ants.analysis.tables import Table, figure, interval, plain_text, thousands
+from taichi_ants.analysis.tables import Table, figure, interval, thousands
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import foraging
@@ -112,9 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     def command() -> None:
         given = parser.parse_args(arguments)
         made = table(measured(given.ants, given.rounds, 0.5), given.ants)
-        print(plain_text([made], 120), end="")
-        if given.publish:
-            publish("performance_models", [made])
+        show("performance_models", [made], given.publish)
 
     run_command(command)
 

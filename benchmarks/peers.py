@@ -14,10 +14,10 @@ from importlib.util import find_spec
 from typing import NamedTuple
 
 import numpy as np
-from measuring import FIGURES, Work, machine, pace, publish
+from measuring import FIGURES, Work, machine, pace, show
 
 from taichi_ants.analysis import style
-from taichi_ants.analysis.tables import Table, figure, interval, plain_text, thousands
+from taichi_ants.analysis.tables import Table, figure, interval, thousands
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 
 
@@ -216,10 +216,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sizes, seconds = (SMALL, 0.0) if given.small else (Sizes(), 1.0)
         found = measured(sizes, given.rounds, seconds)
         made = tables(found, GROUPS, sizes, given.rounds)
-        print(plain_text(made, 130), end="")
         if given.publish:
             draw(found)
-            publish("performance_peers", made)
+        show("performance_peers", made, given.publish)
 
     run_command(command)
 

@@ -22,11 +22,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from measuring import a_ratio, machine, publish
+from measuring import a_ratio, machine, show
 from systems.paper_world import GRID
 
 from taichi_ants import Task, TrainingConfig, World, runtime, train, worlds
-from taichi_ants.analysis.tables import MISSING, Table, figure, plain_text, thousands
+from taichi_ants.analysis.tables import MISSING, Table, figure, thousands
 from taichi_ants.engines.runs.results import TrainingResult
 from taichi_ants.errors import AntsError, count
 from taichi_ants.grid.constants import STREAM_ANT
@@ -287,9 +287,7 @@ def compare(seeds: int, rounds: int, threads: int, least: float, publishes: bool
         steps, seconds = measured(yardsticks, range(seeds), rounds, threads)
     compiled = [compiler_note(command, threads)] if command else []
     made = table(list(yardsticks), steps, seconds, seeds, threads, compiled)
-    print(plain_text([made], 120), end="")
-    if publishes:
-        publish("performance_training", [made])
+    show("performance_training", [made], publishes)
     if not yardsticks:
         print("There is no C compiler (CC, clang, gcc or cc), so the comparison is skipped.")
         return

@@ -64,7 +64,7 @@ def fill() -> None:
 
 def show(name: str, tables: Sequence[Table], publishes: bool, figure: Path | None = None) -> None:
     """Print tables; if asked to, write them and a figure to the docs, and fill the pages."""
-    print(plain_text(tables, width=120))
+    print(plain_text(tables, 120), end="")
     if publishes:
         write(data_file(name), tables)
         if figure is not None:
