@@ -47,8 +47,3 @@ def test_the_columns_of_a_table_are_declared_and_occur(name, written):
     assert undeclared(declared, columns) == []
     for one in declared:
         assert undeclared([one], columns) != columns, one
-
-
-def test_a_column_that_is_not_declared_is_found():
-    columns = ["seed", "reward_mean", "seeds", "mean"]
-    assert undeclared(["seed", "MEASURE_mean"], columns) == ["seeds", "mean"]
