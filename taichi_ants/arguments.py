@@ -48,9 +48,7 @@ def checked_worlds(
     given = entries_of(world) or [world] * n_seeds
     worlds = tuple(checked_world(one, learns, "a colony", COLONY) for one in given)
     if len(worlds) != n_seeds:
-        raise AntsError(
-            f"there are {len(worlds)} worlds for {n_seeds} seeds; give one world per seed."
-        )
+        raise AntsError(f"there are {len(worlds)} worlds for {n_seeds} seeds; give one per seed.")
     check_ranges(worlds)
     n_nests = n_nests or worlds[0].n_nests
     for one in worlds:
@@ -150,13 +148,11 @@ def checked_tables(q_values: np.ndarray, n_worlds: int, axes: Mapping[str, int])
     leading, form = q_values.shape[:-2], q_values.shape[-2:]
     owners = {(n_worlds, *axes.values()): " and ".join(axes), (n_worlds,): "world"}
     if leading and leading not in owners:
-        listed = [
+        forms = [
             f"{(*shape, *form)} for one table per {owners[shape]}"
             for shape in sorted(owners, key=len)
         ]
-        raise AntsError(
-            f"q_values has shape {q_values.shape}; give {form}, {', or '.join(listed)}."
-        )
+        raise AntsError(f"q_values has shape {q_values.shape}; give {form}, {', or '.join(forms)}.")
     return q_values.reshape(*leading[:1], -1, *form)
 
 
@@ -184,9 +180,7 @@ def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
     words = Counter(seed % 2**64 for seed in checked)
     for seed in checked:
         if words[seed % 2**64] > 1:
-            raise AntsError(
-                f"seeds contains {seed} more than once; give seeds that differ modulo 2**64."
-            )
+            raise AntsError(f"seeds contains {seed} more than once, modulo 2**64; give it once.")
     return checked
 
 

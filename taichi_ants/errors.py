@@ -44,10 +44,8 @@ def refuse(name: str, value: object, allowed: str) -> NoReturn:
 
 def unusable(registered: Any, fault: object) -> AntsError:
     """Return the error for a learner or an observation that cannot be used."""
-    kind, said = type(registered).__name__, str(fault).replace(".)", ")")
-    return AntsError(
-        f"{kind.lower()} {registered.name!r} cannot be used: {said}; see help({kind})."
-    )
+    kind, why = type(registered).__name__, str(fault).replace(".)", ")")
+    return AntsError(f"{kind.lower()} {registered.name!r} cannot be used: {why}; see help({kind}).")
 
 
 def imported(feature: str, module: str, extra: str) -> Any:

@@ -83,12 +83,8 @@ class ShorthandSettings(Settings):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the settings that differ from their defaults, JSON-compatible."""
-        values = {setting: getattr(self, setting.name) for setting in declared(type(self))}
-        return {
-            setting.name: _plain(value)
-            for setting, value in values.items()
-            if value != setting.default
-        }
+        values = ((setting, getattr(self, setting.name)) for setting in declared(type(self)))
+        return {one.name: _plain(value) for one, value in values if value != one.default}
 
     def facts(self) -> dict[str, Any]:
         """Return the name and the settings, JSON-compatible."""

@@ -120,9 +120,7 @@ class Snapshot(Record):
 def same(value: object, other: object) -> bool:
     """Return whether two values, arrays or not, are equal; NaN equals NaN in arrays."""
     if isinstance(value, dict) and isinstance(other, dict):
-        return value.keys() == other.keys() and all(
-            same(value[name], other[name]) for name in value
-        )
+        return value.keys() == other.keys() and all(same(value[key], other[key]) for key in value)
     if not isinstance(value, np.ndarray) or not isinstance(other, np.ndarray):
         return not isinstance(value, np.ndarray) and type(value) is type(other) and value == other
     floats = value.dtype.kind == "f"

@@ -27,19 +27,17 @@ _COLUMNS = 4  # panels of a design in a row
 _PARTS = 8  # of a range, each with a mean
 
 
-def centre_columns(
-    found: Mapping[str, Estimator], with_gaps: Sequence[str] = ()
-) -> dict[str, float]:
+def centre_columns(found: Mapping[str, Estimator], gaps: Sequence[str] = ()) -> dict[str, float]:
     """Return the columns of a table for the estimates of several measures.
 
-    Measures in `with_gaps` have a column with the number of seeds without a value.
+    Measures in `gaps` have a column with the number of seeds without a value.
     """
     return {
         f"{name}_{field}": value
         for name, estimator in found.items()
         for field, value in estimator._asdict().items()
         if (estimator.iqm is not None or "iqm" not in field)
-        and (field != "left_out" or name in with_gaps)
+        and (field != "left_out" or name in gaps)
     }
 
 
@@ -133,9 +131,7 @@ def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
         ordered = sorted(points, key=lambda point: point[0]) if numbers else points
         x = [value if numbers else ticks.index(_shown(value)) + shift for value, *_ in ordered]
         mean, low, high = np.array([point[1:] for point in ordered], float).reshape(-1, 3).T
-        (line,) = axes.plot(
-            x, mean, marker=marker, markersize=4.5, color=colour, label=style.label(label)
-        )
+        (line,) = axes.plot(x, mean, marker=marker, ms=4.5, color=colour, label=style.label(label))
         if numbers:
             axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
         else:
@@ -174,9 +170,7 @@ def draw_design(
                 style.logarithmic(axes.xaxis, (1, 3))  # instead of a tick for each mean
             axes.set_xlabel(short(name, names))
         figure.supylabel(words)
-        caption = (
-            "Means over an eighth of the points, or over those with the same choice, with 95 % "
-        )
+        caption = "Means over an eighth of the points, or those with the same choice, with 95 % "
         caption += f"intervals. A point is the mean of {count(values.shape[1], 'seed')}."
         style.frame(figure, f"{sentence(words)} against each setting", caption, {})
     style.save(figure, path)

@@ -253,9 +253,7 @@ def sliders(interventions: Interventions) -> dict[str, Value]:
         )
     if pheromone.dense:  # integer trails cannot diffuse, and dense trails cannot become integers
         least = 0.0 if pheromone.evaporation == "exponential" else min(0.01, pheromone.diffusion)
-        values["diffusion"] = Value(
-            float(pheromone.diffusion), float(least), 1.0, 0.01, f"{rules}.diffusion"
-        )
+        values["diffusion"] = Value(pheromone.diffusion, least, 1.0, 0.01, f"{rules}.diffusion")
     return values | _of_rules(colony.task.rules)
 
 

@@ -121,9 +121,7 @@ class Export:
         self._process.terminate()
 
 
-def _make(
-    kind: str, content: bytes, prepare: Callable[[], None] | None, answers: Connection
-) -> None:
+def _make(kind: str, log: bytes, prepare: Callable[[], None] | None, answers: Connection) -> None:
     """Send numbers of ticks while working, then the result, or a message if there is none."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
     if hasattr(os, "nice"):  # Windows does not have it
@@ -131,7 +129,7 @@ def _make(
     _, make, most = SLOW[kind]
 
     def passed() -> Snapshots:
-        for session, frame in Session.snapshots(Log.read("the session", content), most):
+        for session, frame in Session.snapshots(Log.read("the session", log), most):
             yield session, frame
             answers.send(session.ticks)
 

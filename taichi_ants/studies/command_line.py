@@ -22,9 +22,7 @@ EXIT_BAD_INPUT = 2
 # Help for options that several commands have.
 PLUGIN = "Python file that registers learners, observations, worlds, measures or rules"
 # Names of worlds, because an import of their registry would import NumPy.
-WORLDS = (
-    "paper, open, far_piles, double_bridge, or the path of a map file; --world.SETTING: a setting"
-)
+WORLDS = "paper, open, far_piles, double_bridge, or a map file; --world.SETTING: a setting"
 AGAIN = "Stopped; finished parts are saved. Run the same command again to resume."
 
 

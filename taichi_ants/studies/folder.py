@@ -138,10 +138,8 @@ def _check_grows(folder: Path, before: Mapping[str, Any], asked: Mapping[str, An
         {**{name: facts[name] for name in _BESIDE_SETTINGS}, **flat(facts["settings"])}
         for facts in (before, asked)
     )
-    differ = [name for name in {**there, **here} if there.get(name) != here.get(name)]
-    words = (
-        f"{n} is {shown(there.get(n), 40)} instead of {shown(here.get(n), 40)}" for n in differ
-    )
+    names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
+    words = (f"{n} is {shown(there.get(n), 40)} instead of {shown(here.get(n), 40)}" for n in names)
     raise AntsError(
         f"{files.named(folder)} contains results that this study lacks ({', '.join(words)}); "
         "choose another --out, or give --force to replace them."

@@ -445,13 +445,11 @@ def columns_of(points: Sequence[Point]) -> dict[str, list[Any]]:
 
     Numbers represent worlds, and other points. A point that lacks a setting has None.
     """
-    numbers = {
-        value: n for values in (points, _worlds_of(points)) for n, value in enumerate(values)
-    }
+    index = {value: n for values in (points, _worlds_of(points)) for n, value in enumerate(values)}
     rows = []
     for point in points:
         row = {k: v for k, v in vars(point).items() if k not in _LATER or v not in (None, ())}
-        row |= {k: numbers.get(row[k]) for k in ("world", "pool", "after") if row.get(k)}
+        row |= {k: index.get(row[k]) for k in ("world", "pool", "after") if row.get(k)}
         row |= {"task": point.task.as_dict(), "training": point.training.as_dict()}
         if policy := row.get("policy"):
             row["policy"] = {"name": policy.name, "sha256": policy.sha256}

@@ -43,12 +43,10 @@ class RayWorkers(Executor):
             if _has_token():  # `ray start` demands it then; clusters without tokens ignore it
                 environment["RAY_AUTH_MODE"] = "token"
         os.environ.update(environment | os.environ)
-        self._ray = imported("a cluster", "ray", "ray")
+        ray = self._ray = imported("a cluster", "ray", "ray")
         with _quiet_start():
             try:
-                self._ray.init(
-                    address or "local", **where, logging_level="ERROR", log_to_driver=False
-                )
+                ray.init(address or "local", **where, logging_level="ERROR", log_to_driver=False)
             except (Exception, SystemExit) as error:
                 why = (str(error).strip() or type(error).__name__).splitlines()[0].rstrip(".:")
                 raise AntsError(
@@ -56,10 +54,9 @@ class RayWorkers(Executor):
                     "status`, and if it needs a token, set RAY_AUTH_MODE to token, and "
                     "RAY_AUTH_TOKEN to the one that `ray get-auth-token` prints on the head."
                 ) from error
-        self._head: str = self._ray.get_runtime_context().gcs_address
-        self._remote = cache(self._ray.remote(num_cpus=threads, num_gpus=int(arch == "cuda")))
-        processors = self._ray.cluster_resources().get("CPU", 0)
-        self.num_workers = max(_LEAST, int(processors // threads))
+        self._head: str = ray.get_runtime_context().gcs_address
+        self._remote = cache(ray.remote(num_cpus=threads, num_gpus=int(arch == "cuda")))
+        self.num_workers = max(_LEAST, int(ray.cluster_resources().get("CPU", 0) // threads))
         self._looked = time.monotonic()
 
     def submit(self, call: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:

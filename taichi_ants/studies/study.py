@@ -7,10 +7,10 @@ matters, nor who computes them.
 from __future__ import annotations
 
 import copy
-import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,9 +102,7 @@ class Study:
     def blocks(self, runs: np.ndarray) -> Iterator[Block]:
         """Yield runs, bool (points, seeds), in blocks of points that run in one launch."""
         wanted = np.flatnonzero(runs.any(axis=1)).tolist()
-        for _, group in itertools.groupby(
-            wanted, lambda p: (self.points[p].alike, runs[p].tobytes())
-        ):
+        for _, group in groupby(wanted, lambda p: (self.points[p].alike, runs[p].tobytes())):
             alike = list(group)
             seeds = np.flatnonzero(runs[alike[0]]).tolist()
             size = self.points[alike[0]].runs_of_a_block

@@ -93,9 +93,7 @@ class Base(NamedTuple):
                 raise AntsError(f"{name} cannot vary, or has no values; give a value or a range.")
             for other in self.fixed:  # a group and one of its settings exclude each other, too
                 if f"{other}.".startswith(f"{name}.") or f"{name}.".startswith(f"{other}."):
-                    raise AntsError(
-                        f"{name} is in [vary], and {other} in the fixed settings; remove one."
-                    )
+                    raise AntsError(f"{name} is in [vary], and {other} is fixed; remove one.")
             entry = _ENTRY.match(name)
             if entry and not any(f"{other}.".startswith(f"{entry[0]}.") for other in self.names):
                 raise AntsError(f"{name} is in [vary], but the file has no {entry[0]}; add it.")

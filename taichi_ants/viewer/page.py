@@ -65,9 +65,8 @@ def page(recording: Recording) -> str:
     '<!doctype html>'
     """
     expect("recording", recording, Recording)
-    return assemble(
-        recording.header["title"], recording=base64.b64encode(recording.to_bytes()).decode()
-    )
+    content = base64.b64encode(recording.to_bytes()).decode()
+    return assemble(recording.header["title"], recording=content)
 
 
 def content_policy(script: str, style: str, connect: str = "") -> str:

@@ -26,9 +26,7 @@ _STREAM_ROCKS = int.from_bytes(b"rocks", "big")
 _STREAM_FOOD = int.from_bytes(b"food", "big")
 _BATCH_CELLS = 1 << 22  # the most cells under hexagons that are placed at once, to bound memory
 
-Ranges = Annotated[
-    Sequence[int] | None, Setting("size of the world along x, y and z", unit="cells")
-]
+Ranges = Annotated[Sequence[int] | None, Setting("size of the world along x, y, z", unit="cells")]
 RockShare = Annotated[float, Setting("share of the cells under rocks", least=0, most=MAX_SHARE)]
 Piles = Annotated[int, Setting("number of piles of food", most=3)]
 

@@ -73,7 +73,7 @@ def test_help_shows_the_defaults_that_say_something(parser, monkeypatch):
 
 def test_help_names_all_worlds():
     *names, path = command_line.WORLDS.split("; ")[0].split(", ")
-    assert (sorted(names), path) == (list(worlds.names()), "or the path of a map file")
+    assert (sorted(names), path) == (list(worlds.names()), "or a map file")
 
 
 def fail_with(error):
