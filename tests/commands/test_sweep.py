@@ -156,7 +156,7 @@ WRONG = [
     ("[1, 0]", "[1, 1]", ["task.rewards.shaping has 1 more than once"]),
     ("episodes = 50", "episodes = 49", ["return_last50 needs 50 episodes"]),
     ("[task]", "[world]\nseed = 1\n[task]", ["world.seed has no effect on"]),
-    ("[task]", "[task]\nrewards = 3", ["in [vary], and task.rewards in"]),
+    ("[task]", "[task]\nrewards = 3", ["in [vary], and task.rewards is fixed"]),
     ("[vary]", "[vary]\nseeds = [3, 4]", ["seeds cannot vary"]),
     ("[vary]", "[vary", ["is not valid TOML", "correct it"]),
     ("[task]", '[task]\npreset = "foragin"', ["task.preset is 'foragin'", "foraging"]),
