@@ -19,8 +19,6 @@ static int n_notes, most_notes;
 #include "ant.c"
 #include "grid.h"
 
-#define EXPORT __attribute__((visibility("default")))
-
 static World world;
 static Job job;
 static Run *runs;

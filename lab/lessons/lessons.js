@@ -14,8 +14,6 @@ import { STEPS } from "../page/worlds.js";
 const RANGE = 10, FIRST_CELL = [-8, 0];       // of the paper's world: its size, and where ants start
 /** The recorded steps of lone ants: a map, a slider, and what happened in a step. */
 class Walk {
-  place; walks; bar;
-
   constructor(place, walks, at = 0) {
     const hexagon = STEPS.map(([q, r]) => centre(q, r)).map(([x, y]) => `${(y / 1.82).toFixed(2)},${(x / 1.82).toFixed(2)}`).join(" ");
     const cells = [];
@@ -75,8 +73,6 @@ class Walk {
 
 /** The place of an experiment: an editor if there is something to write, a button, and the result. */
 class Place {
-  element; page; experiment; button; result; group = null;
-
   constructor(element, page) {
     this.element = element;
     this.page = page;
@@ -121,8 +117,6 @@ class Place {
 
 /** A prediction, and what waits for it: one experiment, and everything after it up to the next section. */
 class Group {
-  field; hidden; teachers;
-
   constructor(label, teachers) {
     this.field = label.querySelector("textarea");
     this.hidden = [];

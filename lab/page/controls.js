@@ -91,29 +91,23 @@ export class Controls {
   /** The scene whose settings the controls change: the right one of two. */
   get scene() { return this.lab.runs[this.lab.runs.length - 1].engine.scene; }
 
-  listen({ name, steps, words, restarts }) {
-    const input = byId(`c-${name}`);
-    const say = () => this.say(name, words(steps[Number(input.value)]));
-    input.addEventListener("input", say);
-    input.addEventListener("change", () => {
-      const value = steps[Number(input.value)];
-      if (restarts) this.lab.restart({ [name]: value });
-      else this.lab.set(name, value);
-    });
+  listen(slider) {
+    const { name, steps, restarts } = slider, input = byId(`c-${name}`), value = () => steps[Number(input.value)];
+    input.addEventListener("input", () => this.say(slider, value()));
+    input.addEventListener("change", () => (restarts ? this.lab.restart({ [name]: value() }) : this.lab.set(name, value())));
   }
 
-  say(name, words) {
-    const input = byId(`c-${name}`);
-    byId(`o-${name}`).textContent = words;
-    input.setAttribute("aria-valuetext", words);
+  say({ name, words }, value) {
+    byId(`o-${name}`).textContent = words(value);
+    byId(`c-${name}`).setAttribute("aria-valuetext", words(value));
   }
 
   /** Show the present settings. */
   show() {
     const { scene } = this, ui = this.lab.ui;
-    for (const { name, steps, words } of SLIDERS) {
-      byId(`c-${name}`).value = String(stepOf(steps, scene[name]));
-      this.say(name, words(scene[name]));
+    for (const slider of SLIDERS) {
+      byId(`c-${slider.name}`).value = String(stepOf(slider.steps, scene[slider.name]));
+      this.say(slider, scene[slider.name]);
     }
     byId("learns").checked = Boolean(scene.learns);
     const foraging = scene.rules && !(scene.rules & PARTS.queues);

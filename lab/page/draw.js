@@ -2,9 +2,8 @@
  * rocks and food, pick-ups and deliveries, ants, arrows of the policy, the brush. */
 
 import { CAPACITY } from "./engine.js";
-import { angleOf, centre, ROOT3, scatter } from "./geometry.js";
+import { angleOf, centre, outline, ROOT3, scatter } from "./geometry.js";
 import { fade, LOOKS, scentRamp } from "./looks.js";
-import { outline } from "./shapes.js";
 import { FOOD, hexDistance, ROCK, STEPS } from "./worlds.js";
 
 const DIRECTIONS = 32;          // of the pictures of ants

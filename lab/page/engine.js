@@ -106,7 +106,6 @@ export class Engine {
     this.scene.ants = Math.min(this.scene.ants, wasm.room());
     this.first = { ...this.scene }; // for links
     this.setNumbers();
-    this.setRate();
     wasm.begin(this.first.seed >>> 0, Math.floor(this.first.seed / 2 ** 32), this.first.ants, this.first.first);
     if (scene.learner === LEARNERS.frozen) this.follow();
     this.brush.set(this.world.scent);
@@ -149,19 +148,17 @@ export class Engine {
   get moves() { return this.wasm.count(2); }
   get blocked() { return this.wasm.count(3); }
 
-  setRate() { this.wasm.set_rate(this.scene.learns ? this.scene.rate : 0); }
-
   setNumbers() {
     const s = this.scene, slope = s.rules & PARTS.directed ? Math.max(1, Math.floor((2 * s.level + 50) / 100)) : 0;
+    this.wasm.set_rate(s.learns ? s.rate : 0);
     this.wasm.set_numbers(s.level, slope, s.discount, s.epsilon, s.shaping, s.regrowth);
   }
 
-  /** Give the ants the hand-written policy `trail_follower`, or other values, 5 for each state. */
-  follow(values) {
-    const letters = FOLLOWERS[this.wasm.states()];
-    for (let k = 0; k < this.wasm.states(); k++)
-      for (let a = 0; a < 5; a++)
-        this.values[8 * k + a] = values ? values[5 * k + a] : letters.charCodeAt(k) - 64 >> a & 1;
+  /** Give the ants the hand-written policy `trail_follower`. */
+  follow() {
+    [...FOLLOWERS[this.wasm.states()]].forEach((letter, state) => {
+      for (let a = 0; a < 5; a++) this.values[8 * state + a] = letter.charCodeAt(0) - 64 >> a & 1;
+    });
     this.wasm.read_values();
   }
 
@@ -199,7 +196,6 @@ export class Engine {
     const name = change.do, value = name === "ants" ? Math.min(change.value, this.wasm.room()) : change.value;
     this.scene[name] = allowed(name, value);
     if (name === "ants") this.wasm.set_ants(this.scene.ants);
-    else if (name === "rate" || name === "learns") this.setRate();
     else this.setNumbers();
     this.events.push({ do: name, value: this.scene[name], tick: this.tick });
   }

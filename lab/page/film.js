@@ -25,7 +25,7 @@ export class Film {
     const recorder = new MediaRecorder(copy.captureStream(FRAMES), { mimeType: type, videoBitsPerSecond: BITS }), parts = [];
     recorder.addEventListener("dataavailable", (event) => parts.push(event.data));
     recorder.addEventListener("stop", () => this.save(new Blob(parts, { type: type.split(";")[0] })));
-    this.take = () => {
+    this.add = () => { // the frame that was just drawn
       const x = copy.getContext("2d", { alpha: false });
       x.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--bg");
       x.fillRect(0, 0, copy.width, copy.height);
@@ -38,9 +38,6 @@ export class Film {
     setTimeout(() => recorder.stop(), SECONDS * 1000);
     return undefined;
   }
-
-  /** Add the frame that was just drawn. */
-  add() { if (this.copy) this.take(); }
 
   save(blob) {
     this.copy = null;
