@@ -69,8 +69,6 @@ EXPORT Note *note_steps(int most)
     return notes;
 }
 
-EXPORT int steps_noted(void) { return n_notes; }
-
 /* Train the runs that are prepared; return the address of their tables, then returns, steps and
  * deliveries; or NULL if out of memory. Each run draws from the stream of its seed, a purpose and a
  * number. */

@@ -108,9 +108,8 @@ class Place {
 
   /** @param {import("../../docs/lessons/page/experiments.js").Outcome} outcome */
   show({ say, head, rows, lines, across, walks, at, views }) {
-    const { look } = this.page;
     this.result.innerHTML = (say ? `<p>${escaped(say)}</p>` : "") + (rows ? tableOf(head, rows) : "") + (lines ? plotOf(lines, across) : "")
-      + (views ? `<div class="views">${views.map(({ state, values }) => `<div>${glyph([state >> 6, ...viewOf(state)], values, look)}<b>${ACTS[values.indexOf(Math.max(...values))]}</b>${nameOf(state)}</div>`).join("")}</div>` : "");
+      + (views ? `<div class="views">${views.map(({ state, values }) => `<div>${glyph([state >> 6, ...viewOf(state)], values, LOOKS[this.page.theme])}<b>${ACTS[values.indexOf(Math.max(...values))]}</b>${nameOf(state)}</div>`).join("")}</div>` : "");
     if (walks) new Walk(this.result, walks, at);
   }
 }
@@ -164,8 +163,6 @@ class Lessons extends Stage {
     this.turn();
     for (const place of this.places) if (place.experiment.now) place.run();
   }
-
-  get look() { return LOOKS[this.theme]; }
 
   arrange(chapter) {
     const groups = [];

@@ -13,8 +13,6 @@ const MOST_REPLAY = 200_000; // ticks of a link that are replayed at once
 /** The text after "#" that replays the runs up to now; two runs are joined by "~". */
 export const visitOf = (runs) => runs.map((run) => linkOf(run.engine)).join("~");
 
-const withoutMoment = (runs) => runs.map(({ engine }) => encode(engine.first, engine.events)).join("~");
-
 /** Copy a text; return whether the browser allowed it. Pages in frames and files often need the old way. */
 async function copied(text) {
   try {
@@ -44,7 +42,7 @@ export class Address {
     clearTimeout(this.saving);
     this.saving = setTimeout(() => {
       const { runs } = this.lab, prepared = runs.some((run) => run.start > 0); // ticks that nobody wants to watch
-      this.show(prepared ? visitOf(runs) : withoutMoment(runs));
+      this.show(prepared ? visitOf(runs) : runs.map(({ engine }) => encode(engine.first, engine.events)).join("~"));
     }, SAVE_MS);
   }
 

@@ -9,8 +9,6 @@ const WORLD = WORLDS.findIndex(({ daily }) => daily);
 /** The date as a seed, like 20261127; UTC, so that all visitors have the same map. */
 const seedOf = (date) => Number(date.toISOString().slice(0, 10).replace(/-/g, ""));
 
-const dateOf = (seed) => `${String(seed).slice(0, 4)}-${String(seed).slice(4, 6)}-${String(seed).slice(6)}`;
-
 /** Whether a run plays the map of a day: its scene has the settings of all, and only rocks were drawn. */
 const counts = ({ engine }) => Object.keys(SCENE).every((name) => ["world", "seed"].includes(name) || engine.first[name] === SCENE[name])
   && engine.events.every((event) => event.do === "rock" && event.reach === DAILY.reach && event.path.length === 1)
@@ -33,7 +31,7 @@ export const mayPlace = (run) => run.tick < DAILY.ticks && run.engine.events.len
 
 export function dailyStory(run) {
   const used = run.engine.events.length, { seed } = run.scene, today = seed === seedOf(new Date());
-  const name = today ? "Today’s map" : `The map of ${dateOf(seed)}`;
+  const name = today ? "Today’s map" : `The map of ${String(seed).replace(/(....)(..)/, "$1-$2-")}`;
   if (!counts(run)) {
     return { id: "daily-free", head: `${name}, played freely.`, sub: "With other settings or strokes, this visit does not count. Start it anew for a result.",
              options: ["Play it by the rules"] };

@@ -235,10 +235,11 @@ export class Painter {
   labelScent(x, nx, ny, size) {
     const { levels } = this.run.engine, [pile] = this.piles;
     let near = 12 * this.s, found = levels[this.scented] ? this.scented : 0;
+    const covers = (px, py) => this.piles.some(([fx, fy]) => Math.abs(px - fx) < 3.5 * size && Math.abs(py - fy + size) < 1.5 * size); // "food"
     for (let cell = 0; pile && !levels[this.scented] && cell < levels.length; cell++) {
       if (levels[cell] < 60) continue;
       const [px, py] = this.place(cell), far = Math.hypot(px - 0.35 * nx - 0.65 * pile[0], py - 0.35 * ny - 0.65 * pile[1]);
-      if (far < near) [near, found] = [far, cell];
+      if (far < near && !covers(px, py)) [near, found] = [far, cell];
     }
     this.scented = found;
     if (found) this.label(x, "scent", ...this.place(found), size);

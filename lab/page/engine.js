@@ -18,7 +18,7 @@
  *       `level` is how long new scent lasts, in ticks; `learns` is 0 or 1. Values are rounded to
  *       what links can have (see LIMITS); `engine.scene` has the result.
  *   engine.forget()       drops the rest of a replay, when the visitor acts
- *   engine.tick, .ants, .deliveries, .returns, .moves, .blocked
+ *   engine.tick, .ants, .deliveries, .returns
  *   engine.changed        true after ground has changed by `apply`; the page sets it to false
  *   engine.hash()         16 hexadecimal digits: two engines with the same hash have the same state
  *
@@ -145,8 +145,6 @@ export class Engine {
   get ants() { return this.wasm.ants(); }
   get returns() { return this.wasm.count(0); }
   get deliveries() { return this.wasm.count(1); }
-  get moves() { return this.wasm.count(2); }
-  get blocked() { return this.wasm.count(3); }
 
   setNumbers() {
     const s = this.scene, slope = s.rules & PARTS.directed ? Math.max(1, Math.floor((2 * s.level + 50) / 100)) : 0;
@@ -301,8 +299,9 @@ export class LoneAnts { // complete in itself, because workers get its text
     const memory = this.wasm.memory.buffer; // it may have grown
     this.values = new Float32Array(memory, done, n * 640).slice();
     const [returns, steps, deliveries] = [0, 1, 2].map((k) => new Int32Array(memory, done + 4 * (n * 640 + k * all), all).slice());
-    const whole = new Int32Array(memory, noted, LoneAnts.NOTES.length * this.wasm.steps_noted()), exact = new Float32Array(memory, noted, whole.length);
-    this.notes = Array.from({ length: this.wasm.steps_noted() }, (_, k) => Object.fromEntries(LoneAnts.NOTES.map((name, j) =>
+    const taken = Math.min(notes, steps.reduce((a, b) => a + b, 0)); // steps that are noted
+    const whole = new Int32Array(memory, noted, LoneAnts.NOTES.length * taken), exact = new Float32Array(memory, noted, whole.length);
+    this.notes = Array.from({ length: taken }, (_, k) => Object.fromEntries(LoneAnts.NOTES.map((name, j) =>
       [name, (name === "value" ? exact : whole)[k * LoneAnts.NOTES.length + j]])));
     return { returns, steps, deliveries };
   }

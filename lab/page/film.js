@@ -36,7 +36,6 @@ export class Film {
     recorder.start();
     lab.toast("Recording six seconds …", SECONDS * 1000);
     setTimeout(() => recorder.stop(), SECONDS * 1000);
-    return undefined;
   }
 
   save(blob) {

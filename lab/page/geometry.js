@@ -35,8 +35,7 @@ function corner(q, r, k) {
   return [x + Math.cos(angle), y + Math.sin(angle)];
 }
 
-/* Corners of three cells are computed three times and differ in their last bits; keys are equal. */
-/** @param {number[]} point */
+/** Corners of three cells are computed three times and differ in their last bits; keys are equal. @param {number[]} point */
 const keyOf = ([x, y]) => Math.round(x * 2) * 65536 + Math.round(y * 4 / ROOT3);
 
 /** @param {number[]} from  @param {number[]} to */

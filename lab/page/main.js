@@ -145,8 +145,8 @@ class Lab {
   }
 
   /** A change by the visitor; whatever a replay still holds is dropped. */
-  act(event) {
-    for (const run of this.runs) {
+  act(event, runs = this.runs) {
+    for (const run of runs) {
       run.engine.forget();
       run.apply(event);
     }
@@ -155,11 +155,8 @@ class Lab {
 
   /** Change a setting; of two runs, that of the right one. */
   set(name, value) {
-    const run = this.runs[this.runs.length - 1];
-    run.engine.forget();
-    run.apply({ do: name, value });
+    this.act({ do: name, value }, this.runs.slice(-1));
     this.controls.show();
-    this.address.save();
   }
 
   mayDraw() {
@@ -188,7 +185,6 @@ class Lab {
     this.ui.playing = on;
     byId("play").innerHTML = icon(on ? "pause" : "play");
     byId("play").setAttribute("aria-label", on ? "Pause" : "Play");
-    return undefined;
   }
 
   choose(brush) {

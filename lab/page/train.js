@@ -43,7 +43,6 @@ export class Training {
     this.lab = lab;
     this.bytes = bytes;
     this.dialog = byId("training");
-    this.curves = [];
     byId("train").addEventListener("click", () => this.open());
     this.dialog.addEventListener("click", ({ target }) => { if (target === this.dialog) this.dialog.close(); });
     this.dialog.addEventListener("close", () => this.stop());
