@@ -116,18 +116,17 @@ export class Engine {
   /** Make views of the memory, which does not grow after `lay_out`. */
   look() {
     const at = (k, Kind, n) => new Kind(this.wasm.memory.buffer, this.wasm.array(k), n);
-    const n = CAPACITY;
     this.laid = at(0, Uint8Array, this.size); // with ants; `ground` is that of the frame
     this.shownGround = at(1, Uint8Array, this.size);
     this.shownLevels = at(2, Uint8Array, this.size);
     this.traffic = at(3, Float32Array, this.size);
     this.brush = at(4, Int32Array, this.size);
-    this.cells = at(5, Int32Array, n);
-    this.before = at(6, Int32Array, n);
-    this.before2 = at(7, Int32Array, n);
-    this.headings = at(8, Uint8Array, n);
-    this.looks = at(9, Uint8Array, n);
-    this.states = at(10, Uint16Array, n);
+    this.cells = at(5, Int32Array, CAPACITY);
+    this.before = at(6, Int32Array, CAPACITY);
+    this.before2 = at(7, Int32Array, CAPACITY);
+    this.headings = at(8, Uint8Array, CAPACITY);
+    this.looks = at(9, Uint8Array, CAPACITY);
+    this.states = at(10, Uint16Array, CAPACITY);
     this.values = at(11, Float32Array, 8 * this.wasm.states());
     this.read = at(12, Int32Array, 4);
   }

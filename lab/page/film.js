@@ -10,13 +10,12 @@ export class Film {
   constructor(lab) {
     this.lab = lab;
     this.copy = null; // the canvas that is recorded now
-    byId("film").addEventListener("click", () => this.start());
+    byId("film").addEventListener("click", () => { if (!this.copy) this.start(); });
   }
 
   start() {
     const { lab } = this, type = window.MediaRecorder && TYPES.find((one) => MediaRecorder.isTypeSupported(one));
     if (!type) return lab.toast(CANNOT);
-    if (this.copy) return undefined;
     const canvases = lab.sides.filter((side) => side.run).map((side) => side.canvas);
     const copy = this.copy = document.createElement("canvas"), [{ width, height }] = canvases;
     const side = Math.min(width, height), scale = Math.min(1, MOST_PIXELS_WIDE / (side * canvases.length));
