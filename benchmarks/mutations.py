@@ -72,8 +72,8 @@ MUTATIONS = [
     ("features/labour.py", "lowered > 0.0, lowered", "True, lowered", COLONY),
     (
         "engines/colony/learning.py",
-        "does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0",
-        "does = True",
+        "columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0 if",
+        "True if",
         CASTES,
     ),
     ("engines/colony/steps.py", ">> number & 1 == 1", ">> 0 & 1 == 1", COLONY),
@@ -149,8 +149,8 @@ MUTATIONS = [
     ),
     (
         "task/rules/policy.py",
-        "(1.0 - explores) / ti.cast(ties",
-        "1.0 / ti.cast(ties",
+        "(1.0 - explores) / ti.cast(popcnt(best)",
+        "1.0 / ti.cast(popcnt(best)",
         "tests/offline/test_recording.py",
     ),
     ("task/rules/policy.py", "cumulative <= drawn", "cumulative < drawn / 2", CHOICE),

@@ -189,13 +189,10 @@ def do(phase, c, v, chunk):
             phase.do(c, v, w, tick)
 
 
-@function
+@while_compiling
 def is_taken(c, v, ant):
     """Return whether an ant is in a slot; without vacant slots, always, while a kernel compiles."""
-    taken = True
-    if ti.static(v.slots_matter):
-        taken = trait(c.stage, ant) != layout.Stage.VACANT
-    return taken
+    return trait(c.stage, ant) != layout.Stage.VACANT if v.slots_matter else True
 
 
 # What all ants do between two ticks.

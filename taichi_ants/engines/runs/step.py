@@ -161,8 +161,8 @@ def state_carrying(a: ti.template(), ant, left, forward, right):
 def state_foraging(half: ti.template(), left, forward, right, clock):
     """Return the paper's state of an ant without food that sees three packed cells."""
     trail_left, trail_forward, trail_right = left - clock, forward - clock, right - clock
-    return vision.paper_state_foraging(
-        half,
+    return vision.paper_state_by_level(
+        *(half, 0),
         ground_of(left),
         ground_of(forward),
         ground_of(right),
