@@ -77,12 +77,6 @@ def nest_of(c, v, ant):
 
 
 @function
-def own_map(c, v, w, ant):
-    """Return the place of an ant's cell in an array with a map for each nest."""
-    return (w * v.n_nests + nest_of(c, v, ant)) * c.size + c.cell[ant]
-
-
-@function
 def of_caste(c, ant, row):
     """Return a number of the caste of an ant, f64; `row` is a `CasteRow`."""
     return c.castes[row, trait(c.caste, ant)]

@@ -22,7 +22,7 @@ from taichi_ants.engines.colony.columns import chunks_of, function, share_of, tr
 from taichi_ants.engines.colony.layout import Order, WorldRow
 from taichi_ants.engines.colony.views import entries_of
 from taichi_ants.features import hooks_at
-from taichi_ants.kernel_functions import kernel_function, while_compiling
+from taichi_ants.kernel_functions import Named, kernel_function, while_compiling
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
@@ -216,18 +216,18 @@ def once(v: Variant, name: str, arguments: Any) -> Callable[..., None]:
     return advance_colony
 
 
+@while_compiling
+def entries_in_world(of, c, v):
+    """Return the number of entries of each world, such as ants or cells, by the numbers `c`."""
+    if of in (STATES, SUMS):
+        return v.n_rows * c.places if of == SUMS else v.n_rows
+    return 1 if of == WORLD else c.n_slots if of == ANTS else c.size
+
+
 @function
 def do_one(phase, c, v, i):
     """Do a phase for entry i of what all worlds have, such as an ant or a cell; or for world i."""
-    w = i
-    if ti.static(phase.of == ANTS):
-        w = i // c.n_slots
-    elif ti.static(phase.of == CELLS):
-        w = i // c.size
-    elif ti.static(phase.of == STATES):
-        w = i // v.n_rows
-    elif ti.static(phase.of == SUMS):
-        w = i // (v.n_rows * c.places)
+    w = i // entries_in_world(phase.of, c, v)
     running, tick = c.worlds[WorldRow.RUNNING, w], c.worlds[WorldRow.TICKS, w]
     if ti.static(phase.of == STATES):
         phase.do(c, v, w, i - w * v.n_rows, i - w * v.n_rows + 1)
@@ -262,16 +262,9 @@ def by_ant(v: Variant, name: str, contents: memory.Contents, arguments: Any) -> 
     )
 
     @while_compiling
-    def lengths_of(numbers: Any) -> dict[str, Any]:
-        number = partial(memory.number_of, contents, numbers)
-        n_worlds = number("n_worlds")
-        return {
-            ANTS: n_worlds * number("n_slots"),
-            CELLS: n_worlds * number("size"),
-            STATES: n_worlds * v.n_rows,
-            SUMS: n_worlds * number("places") * v.n_rows,
-            WORLD: n_worlds,
-        }
+    def lengths_of(memories: Any) -> dict[str, Any]:
+        numbers = Named(partial(memory.number_of, contents, memories))
+        return {of: numbers.n_worlds * entries_in_world(of, numbers, v) for of, _ in loops}
 
     @ti.kernel
     def advance_colony(c: arguments):

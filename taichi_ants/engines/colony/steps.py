@@ -14,7 +14,6 @@ all ants act.
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import taichi as ti
 from taichi.lang.impl import subscript
@@ -205,12 +204,6 @@ def view_around(c, v, cues, w, ant, carries, tick):
     return view
 
 
-@while_compiling
-def set_entry(view: Any, name: str, level: Any) -> None:
-    """Set the level of the ant's own cell in a view, while a kernel compiles."""
-    getattr(view, f"own_{name}")._assign(level)
-
-
 @function
 def read_fields(c, v, view, k, index, standable, tick):
     """Set the levels of cell number k of a view in the pheromones that the observation reads."""
@@ -219,12 +212,11 @@ def read_fields(c, v, view, k, index, standable, tick):
         vision.entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
 
 
-@function
+@while_compiling
 def read_own_levels(c, v, view, here, tick):
     """Set the levels of the ant's own cell in the pheromones that the observation reads."""
-    for i in ti.static(range(len(v.reads))):
-        level = level_of(ti.static(v.field(c, v.reads[i])), here, tick)
-        set_entry(view, v.observation.reads[i], level)
+    for name, number in zip(v.observation.reads, v.reads, strict=True):
+        getattr(view, f"own_{name}")._assign(level_of(v.field(c, number), here, tick))
 
 
 @function
