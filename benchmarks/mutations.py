@@ -89,7 +89,7 @@ MUTATIONS = [
     ),
     ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
     ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
-    ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
+    ("engines/colony/steps.py", "(field.half, carries", "(True, carries", COLONY),
     ("task/model.py", "task.choice.carriers_follow or ", "", CHOICE),
     ("measures/tidy.py", "column.startswith(f", "column == (f", RESULTS_OF_RUNS),
     ("rendering/rasteriser.py", "ANTS[snapshot.ant_nests]", "ANTS[0 * snapshot.ant_nests]", RASTER),

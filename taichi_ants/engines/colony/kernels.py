@@ -167,9 +167,7 @@ def last_groups(v: Variant) -> Iterator[Group]:
 @function
 def do(phase, c, v, chunk):
     """Do a phase for a chunk, or for the world `chunk`, unless its episode has ended."""
-    w = chunk
-    if ti.static(phase.of != WORLD):
-        w = chunk // chunks_of(c, v)
+    w = chunk if ti.static(phase.of == WORLD) else chunk // chunks_of(c, v)
     if ti.static(phase.of == STATES):  # without updates if the episode has ended
         first, last = share_of(c, v, chunk, v.n_rows)
         phase.do(c, v, w, first, last)

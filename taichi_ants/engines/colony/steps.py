@@ -97,42 +97,37 @@ def observe_with(c, v, cues, w, ant, carries, tick):
     return paper_state, v.encode(view)
 
 
+@while_compiling
+def cells_ahead(c, here, heading):
+    """Return the places of the cells left, forward and right of an ant."""
+    return [here + actions.step_towards(c.compass, heading, i) for i in (LEFT, FORWARD, RIGHT)]
+
+
 @function
 def see(c, v, cues, w, ant, tick):
     """Return the paper's state, without values that only other observations need."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
-    left = here + actions.step_towards(c.compass, heading, LEFT)
-    forward = here + actions.step_towards(c.compass, heading, FORWARD)
-    right = here + actions.step_towards(c.compass, heading, RIGHT)
+    cells = cells_ahead(c, here, heading)
     queen = own_queen(c, v, w, ant)
-    ground_left, ground_forward = looks_of(c, v, left, queen), looks_of(c, v, forward, queen)
-    ground_right = looks_of(c, v, right, queen)
+    grounds = [looks_of(c, v, cells[i], queen) for i in ti.static(range(3))]
     paper_state = 0
     if trait(c.carries, ant) == 1:
         if ti.static(cues.has_sense):
             nearer = vision.nearer_from(better_around(c, v, cues, w, ant), heading)
-            paper_state = vision.paper_state_carrying(
-                ground_left, ground_forward, ground_right, nearer
-            )
+            paper_state = vision.paper_state_carrying(*grounds, nearer)
         else:
-            homing = ti.static(v.field(c, cues.followed))
-            paper_state = vision.paper_state_by_level(
-                *(homing.half, 1, ground_left, ground_forward, ground_right),
-                level_in_view(c, homing, left, tick),
-                level_in_view(c, homing, forward, tick),
-                level_in_view(c, homing, right, tick),
-                strongest_of(c, homing, left, forward, right, tick),
-            )
+            paper_state = see_by_level(c, v.field(c, cues.followed), 1, grounds, cells, tick)
     else:
-        outbound = ti.static(v.field(c, cues.outbound))
-        paper_state = vision.paper_state_by_level(
-            *(cues.half, 0, ground_left, ground_forward, ground_right),
-            level_in_view(c, outbound, left, tick),
-            level_in_view(c, outbound, forward, tick),
-            level_in_view(c, outbound, right, tick),
-            strongest_of(c, outbound, left, forward, right, tick),
-        )
+        paper_state = see_by_level(c, v.field(c, cues.outbound), 0, grounds, cells, tick)
     return paper_state
+
+
+@while_compiling
+def see_by_level(c, field, carries, grounds, cells, tick):
+    """Return the paper's state of an ant that follows a pheromone."""
+    levels = [level_in_view(c, field, cell, tick) for cell in cells]
+    strongest = strongest_of(c, field, *cells, tick)
+    return vision.paper_state_by_level(field.half, carries, *grounds, *levels, strongest)
 
 
 @function
@@ -161,14 +156,12 @@ def cue_level(c, v, cues, carries, index, tick):
 @function
 def strongest_cue(c, v, cues, carries, here, heading, tick):
     """Return the largest level that counts ahead, in the pheromone of `cue_level`."""
-    left = here + actions.step_towards(c.compass, heading, LEFT)
-    forward = here + actions.step_towards(c.compass, heading, FORWARD)
-    right = here + actions.step_towards(c.compass, heading, RIGHT)
+    cells = cells_ahead(c, here, heading)
     outbound = ti.static(v.field(c, cues.outbound))
-    level = ti.cast(strongest_of(c, outbound, left, forward, right, tick), v.level_type)
+    level = ti.cast(strongest_of(c, outbound, *cells, tick), v.level_type)
     if ti.static(not cues.has_sense):
         field = ti.static(v.field(c, cues.followed))
-        homing = ti.cast(strongest_of(c, field, left, forward, right, tick), v.level_type)
+        homing = ti.cast(strongest_of(c, field, *cells, tick), v.level_type)
         level = ti.select(carries == 1, homing, level)
     return level
 
