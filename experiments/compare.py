@@ -141,6 +141,7 @@ def plan(options: Mapping[str, Any]) -> Plan:
     study = Study(tuple(points), seeds, arrays, measured)
     discounts = tuple(dict.fromkeys(options["discounts"]))
     exact = process.begin(bounds.bound_rows, world, points[0].task, discounts, points[0].max_steps)
+    process.begin(page.get_ready, world, points[0].task)
     return Plan(study, name, exact)
 
 

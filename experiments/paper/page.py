@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,16 +17,21 @@ from paper.baselines import Baseline
 from paper.claims import Audit, headlines
 from paper.comparison import DEFINITIONS, Comparison, counts
 from paper.table2 import Line, summarise_behaviours
+from taichi_ants.analysis import style
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
+from taichi_ants.engines.runs.results import RolloutArguments
 from taichi_ants.errors import count
 from taichi_ants.rendering import Episode
+from taichi_ants.rendering.snapshots import colony_of_rollout
 from taichi_ants.report.page import Picture, Player, ShownFinding, Statement, Statements, fill
 from taichi_ants.studies.command_line import progress_bar
 from taichi_ants.studies.points import RunPoint
 from taichi_ants.task import Task
-from taichi_ants.viewer import record_trace
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.viewer import record_colony, record_trace
+from taichi_ants.worlds.world import World
 
 STEPS = 80  # the longest recording; a delivery takes 34 steps, walking to and fro on the trail 38
 
@@ -63,20 +69,26 @@ def as_in_training(task: Task) -> Task:
     return replace(task, evaporation_in_evaluation=task.evaporation_in_training)
 
 
+def get_ready(world: World, task: Task) -> None:
+    """Import what draws figures and prepare the kernels of recordings, while others train."""
+    style.new_figure(1)
+    table = np.zeros((task.n_states, N_ACTIONS), np.float32)
+    arguments = RolloutArguments(world, as_in_training(task), 0, 1, 0, table)
+    record_colony(colony_of_rollout(arguments), 1)
+
+
 def begin(
     comparison: Comparison,
     baselines: Sequence[Baseline],
     examples: Sequence[Example],
     folder: Path,
 ) -> Callable[[], Seen]:
-    """Return a function that waits for all figures and recordings.
+    """Return a function that waits for all figures and recordings, and draws the sheet.
 
-    This process follows the policies, because it has compiled the kernel. The second process begins
-    with the figures, for which it does not start Taichi; this one begins with the last calls.
+    This process follows the policies, because it has compiled the kernel.
     """
     played = [example.played() for example in examples]
-    drawn = process.begin(figures.save_all, comparison, baselines, folder / "figures")
-    calls: dict[Any, process.Begun] = {"figures": drawn}
+    calls: dict[Any, process.Begun] = {}
     first: dict[int, tuple[Example, Episode]] = {}
     for example, episode in zip(examples, played, strict=True):
         first.setdefault(int(comparison.behaviours[example.row, example.run]), (example, episode))
@@ -94,7 +106,10 @@ def begin(
         if code == DELIVERS:
             title, task = f"{variant.label}: policy", example.point.task
             captions["sheet"] = "", f"The policy of an ant: {whose}"
-            calls["sheet"] = process.begin(policy_sheet, example.q_values, title, task=task)
+            draws = partial(policy_sheet, example.q_values, title, task=task)
+    calls["figures"] = process.begin(figures.save_all, comparison, baselines, folder / "figures")
+    if "sheet" in captions:
+        calls["sheet"] = draws
 
     def wait() -> Seen:
         with progress_bar("pictures") as progress:
