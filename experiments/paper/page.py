@@ -21,9 +21,9 @@ from taichi_ants.analysis import style
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
-from taichi_ants.engines.runs.results import RolloutArguments
+from taichi_ants.engines.runs.results import RolloutArguments, Trace
+from taichi_ants.engines.runs.training import rollout
 from taichi_ants.errors import count
-from taichi_ants.rendering import Episode
 from taichi_ants.rendering.snapshots import colony_of_rollout
 from taichi_ants.report.page import Picture, Player, ShownFinding, Statement, Statements, fill
 from taichi_ants.studies.command_line import progress_bar
@@ -45,15 +45,13 @@ class Example(NamedTuple):
     seed: int
     q_values: np.ndarray
 
-    def played(self) -> Episode:
+    def played(self) -> Trace:
         """Return the first steps of the episode by which its behaviour was classified.
 
         It has the evaporation of training, not that of the greedy evaluation.
         """
         steps, task = min(self.point.max_steps, STEPS), as_in_training(self.point.task)
-        return Episode.play(
-            self.point.world, self.q_values, seed=self.seed, max_steps=steps, task=task
-        )
+        return rollout(self.point.world, self.q_values, self.seed, 0, steps, task)
 
 
 class Seen(NamedTuple):
@@ -71,7 +69,7 @@ def as_in_training(task: Task) -> Task:
 
 def get_ready(world: World, task: Task) -> None:
     """Import what draws figures and prepare the kernels of recordings, while others train."""
-    style.new_figure(1)
+    style.new_figure(1).subplots()
     table = np.zeros((task.n_states, N_ACTIONS), np.float32)
     arguments = RolloutArguments(world, as_in_training(task), 0, 1, 0, table)
     record_colony(colony_of_rollout(arguments), 1)
@@ -87,13 +85,16 @@ def begin(
 
     This process follows the policies, because it has compiled the kernel.
     """
-    played = [example.played() for example in examples]
-    calls: dict[Any, process.Begun] = {}
-    first: dict[int, tuple[Example, Episode]] = {}
-    for example, episode in zip(examples, played, strict=True):
-        first.setdefault(int(comparison.behaviours[example.row, example.run]), (example, episode))
+    first: dict[int, Example] = {}
+    for example in examples:
+        first.setdefault(int(comparison.behaviours[example.row, example.run]), example)
+    calls: dict[Any, process.Begun] = {
+        code: process.begin(record_trace, example.played(), BEHAVIOURS[code])
+        for code, example in first.items()
+    }
+    calls["figures"] = process.begin(figures.save_all, comparison, baselines, folder / "figures")
     done, captions = counts(comparison.behaviours), dict[Any, tuple[str, str]]()
-    for code, (example, episode) in sorted(first.items()):
+    for code, example in sorted(first.items()):
         _, variant, grid = comparison.rows[example.row]
         whose = (
             f"{variant.label}, delivery {example.point.task.delivery}, seed {example.seed}, "
@@ -102,14 +103,10 @@ def begin(
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Shown: {whose}."
         captions[code] = sentence(BEHAVIOURS[code]), words
-        calls[code] = process.begin(record_trace, episode.trace, BEHAVIOURS[code])
         if code == DELIVERS:
             title, task = f"{variant.label}: policy", example.point.task
             captions["sheet"] = "", f"The policy of an ant: {whose}"
-            draws = partial(policy_sheet, example.q_values, title, task=task)
-    calls["figures"] = process.begin(figures.save_all, comparison, baselines, folder / "figures")
-    if "sheet" in captions:
-        calls["sheet"] = draws
+            calls["sheet"] = partial(policy_sheet, example.q_values, title, task=task)
 
     def wait() -> Seen:
         with progress_bar("pictures") as progress:
