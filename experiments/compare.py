@@ -16,6 +16,8 @@ from taichi_ants.studies.interruption import stoppable
 with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     import gc
+
+    gc.set_threshold(300_000)  # with Python's default, collections take a tenth of the time
     from collections.abc import Callable, Mapping, Sequence
     from dataclasses import dataclass, fields, replace
     from functools import partial
@@ -49,7 +51,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.points import RunPoint, settings_of
     from taichi_ants.studies.study import Study
 
-gc.set_threshold(300_000)  # with Python's default, collections take a tenth of the time
 VERSION = 1  # of the arrays that are kept of each run
 DELIVERIES = ("truncates", "terminates")
 ROLLOUTS = 50
@@ -234,10 +235,11 @@ def tables(plan: Plan, results: Results) -> str:
     comparison = replace(comparison, curves=figures.curves_of(comparison, arrays))
     follow, runs = partial(evaluate, arch=arch), (study.seeds, first.rollouts, first.max_steps)
     baselines = plan.exact() + bounds.policy_rows(first.world, first.task, follow, *runs)
+    saved = process.begin(figures.save_all, comparison, baselines, folder / "figures")
     chosen = [trained(study, row, run, arch) for row, run in examples(comparison)]
     seen: Callable[[], Seen] = Seen
     if results.figures:
-        seen = page.begin(comparison, baselines, chosen, folder)
+        seen = page.begin(comparison, baselines, chosen, saved)
 
     summaries = summarise(comparison)
     lines, audit = table2(comparison, summaries), assess(comparison)

@@ -69,7 +69,7 @@ def as_in_training(task: Task) -> Task:
 
 def get_ready(world: World, task: Task) -> None:
     """Import what draws figures and prepare the kernels of recordings, while others train."""
-    style.new_figure(1).subplots()
+    style.new_figure(1)
     table = np.zeros((task.n_states, N_ACTIONS), np.float32)
     arguments = RolloutArguments(world, as_in_training(task), 0, 1, 0, table)
     record_colony(colony_of_rollout(arguments), 1)
@@ -79,21 +79,20 @@ def begin(
     comparison: Comparison,
     baselines: Sequence[Baseline],
     examples: Sequence[Example],
-    folder: Path,
+    saved: process.Begun,
 ) -> Callable[[], Seen]:
-    """Return a function that waits for all figures and recordings, and draws the sheet.
+    """Return a function that waits until figures are `saved`, and draws what the page shows.
 
     This process follows the policies, because it has compiled the kernel.
     """
     first: dict[int, Example] = {}
     for example in examples:
         first.setdefault(int(comparison.behaviours[example.row, example.run]), example)
-    calls: dict[Any, process.Begun] = {
-        code: process.begin(record_trace, example.played(), BEHAVIOURS[code])
-        for code, example in first.items()
-    }
-    calls["figures"] = process.begin(figures.save_all, comparison, baselines, folder / "figures")
-    done, captions = counts(comparison.behaviours), dict[Any, tuple[str, str]]()
+    calls: dict[Any, process.Begun] = {"saved": saved}
+    for code, example in first.items():
+        calls[code] = process.begin(record_trace, example.played(), BEHAVIOURS[code])
+    calls["figures"] = process.begin(figures.for_page, comparison, baselines)
+    done, captions = counts(comparison.behaviours), dict[int, tuple[str, str]]()
     for code, example in sorted(first.items()):
         _, variant, grid = comparison.rows[example.row]
         whose = (
@@ -104,18 +103,20 @@ def begin(
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Shown: {whose}."
         captions[code] = sentence(BEHAVIOURS[code]), words
         if code == DELIVERS:
-            title, task = f"{variant.label}: policy", example.point.task
-            captions["sheet"] = "", f"The policy of an ant: {whose}"
-            calls["sheet"] = partial(policy_sheet, example.q_values, title, task=task)
+            words, title = f"The policy of an ant: {whose}", f"{variant.label}: policy"
+            calls["sheet"] = partial(_sheet, words, example, title)
 
     def wait() -> Seen:
         with progress_bar("pictures") as progress:
             results = process.results_of(calls, progress)
         players = [Player(*captions[code], results[code]) for code in sorted(first)]
-        sheet = Picture(captions["sheet"][1], results["sheet"]) if "sheet" in results else None
-        return Seen(results["figures"], players, sheet)
+        return Seen(results["figures"], players, results.get("sheet"))
 
     return wait
+
+
+def _sheet(words: str, example: Example, title: str) -> Picture:
+    return Picture.of(words, policy_sheet(example.q_values, title, task=example.point.task))
 
 
 def comparison_page(
