@@ -52,7 +52,7 @@ def results() -> Results:
 def comparison_html() -> str:
     """Return the page of `results`."""
     recording = record_trace(rollout(worlds.paper(), trail_follower()))
-    sheet = Picture("a <policy>", np.full((20, 30, 3), 200, np.uint8))
+    sheet = Picture.of("a <policy>", np.full((20, 30, 3), 200, np.uint8))
     comparison, lines, audit = results()
     return comparison_page(
         *(comparison, BASELINES, lines, audit),
