@@ -24,17 +24,16 @@ DOCS = Path(__file__).parent
 REFERENCE = DOCS / "reference"
 sys.path[:0] = [str(DOCS.parent), str(DOCS.parent / "experiments")]
 
-import columns  # noqa: E402
-
 import taichi_ants  # noqa: E402
 from taichi_ants import envs, learners, measures, rules, task, worlds  # noqa: E402, F401
 from taichi_ants.commands import COMMANDS  # noqa: E402
+from taichi_ants.files import tomllib  # noqa: E402
 from taichi_ants.measures.finished import FINISHED  # noqa: E402
 from taichi_ants.protocol import EVENTS  # noqa: E402
 from taichi_ants.settings import Named, declared  # noqa: E402
 from taichi_ants.studies import command_line  # noqa: E402
-from taichi_ants.studies.columns import NAMES, SWEEP  # noqa: E402
-from taichi_ants.studies.sweep_file import KEYS, KINDS, WORLD_KEYS  # noqa: E402
+from taichi_ants.studies.design import Design  # noqa: E402
+from taichi_ants.studies.sweep_file import KEYS, KINDS  # noqa: E402
 from taichi_ants.task import observations  # noqa: E402
 
 
@@ -138,13 +137,13 @@ def measures_of(kind: str) -> str:
 
 def tables(command: str) -> str:
     """Return the tables that a command writes, with all their columns."""
+    every = tomllib.loads((REFERENCE / "columns.toml").read_text("utf-8"))[command]
     if command == "names":
-        rows = ([f"`{name}`", meaning] for name, (_, meaning) in NAMES.items())
+        rows = ([f"`{name}`", one["meaning"]] for name, one in every.items())
         return table(("In a name", "Stands for"), rows)
-    every = SWEEP if command == "sweep" else getattr(columns, command.upper())
     return "\n\n".join(
-        f"### `{name}` of `{command}`\n\nIt has a row for each {one.row}.\n\n"
-        + table(("Column", "Meaning"), ([f"`{c}`", about] for c, about in one.columns.items()))
+        f"### `{name}` of `{command}`\n\nIt has a row for each {one['row']}.\n\n"
+        + table(("Column", "Meaning"), ([f"`{c}`", about] for c, about in one["columns"].items()))
         for name, one in every.items()
     )
 
@@ -158,10 +157,11 @@ def sweep_keys(part: str) -> str:
         rows = [[f"`{one.name}`", *one.in_words] for one in own]
         return table(("Key", "Values", "Default", "Meaning"), rows).replace("'", '"')
     else:
-        rows = [
-            [f"`{name}`", about]
-            for name, about in {"file": KEYS, "world": WORLD_KEYS}[part].items()
-        ]
+        meanings = tomllib.loads((REFERENCE / "sweep_keys.toml").read_text("utf-8"))[part]
+        for one in declared(Design) if part == "file" else ():
+            values, default, _ = one.in_words
+            meanings[one.name] = f"{one.rule.help}; {values} (default: {default})"
+        rows = [[f"`{name}`", meanings[name]] for name in (KEYS if part == "file" else meanings)]
     return table(("Key", "Meaning"), rows).replace("`'", '`"').replace("'`", '"`')
 
 

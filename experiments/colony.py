@@ -178,10 +178,9 @@ class Plan:
 
 
 def plan(options: Mapping[str, Any]) -> Plan:
-    """Return the study, which evaluates all conditions with and without exploration.
+    """Return the study; AntsError if ants cannot share a table with the learner.
 
-    Raises:
-        AntsError: Ants cannot share a table with the learner.
+    It evaluates all conditions with and without exploration.
     """
     given = nested({path: value for path, value in options.items() if "." in path})
     training = LEARNING.replace(**given.get("training", {}))

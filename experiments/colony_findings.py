@@ -16,28 +16,12 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.findings import (
-    LEAST_SEEDS,
-    Contrast,
-    Finding,
-    Verdict,
-    above,
-    judge,
-    weakest,
-)
+from taichi_ants.analysis import findings as judging
+from taichi_ants.analysis import tables as printing
+from taichi_ants.analysis.findings import LEAST_SEEDS, Contrast, Finding, Verdict, above, judge
 from taichi_ants.analysis.statistics import Estimator
 from taichi_ants.analysis.sweeps import centre_columns, centres_of
-from taichi_ants.analysis.tables import (
-    MISSING,
-    Block,
-    Table,
-    figure,
-    interval,
-    number,
-    percent,
-    sentence,
-    tally,
-)
+from taichi_ants.analysis.tables import MISSING, Block, Table, figure, interval, percent, sentence
 from taichi_ants.errors import count
 from taichi_ants.files import tomllib
 from taichi_ants.measures.finished import COLONY
@@ -295,7 +279,9 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
     def cell(row: ConditionRow | None) -> str:
         if row is None:
             return MISSING
-        with_, without = (number(row.estimates[n].mean, digits) for n in ("deliveries", "greedy"))
+        with_, without = (
+            printing.number(row.estimates[n].mean, digits) for n in ("deliveries", "greedy")
+        )
         return f"{with_} ({without}), {percent(row.estimates['bound_share'].mean)}"
 
     alone = [Trained(rules, ALONE) for rules in (PAPER, ABC)]
@@ -356,7 +342,7 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
     conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
     lines = ["Statements about the largest colonies"]
     for question in QUESTIONS:
-        verdicts = tally(
+        verdicts = printing.tally(
             of_largest(findings).verdict.value
             for (_, series), findings in judged.items()
             if series.question == question
@@ -373,4 +359,4 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
 def of_largest(findings: Mapping[Sizes, Finding]) -> Finding:
     """Return the finding on the largest colony; of several, that with the strongest objection."""
     largest = max(ants for ants, _ in findings)
-    return weakest([one for (ants, _), one in findings.items() if ants == largest])
+    return judging.weakest([one for (ants, _), one in findings.items() if ants == largest])

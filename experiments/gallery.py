@@ -186,7 +186,10 @@ def make_live(folder: Path, browser: Any) -> None:
 
 
 def _keep(picture: bytes, path: Path) -> None:
-    """Write a picture in 256 colours, one of them that of the queen, who has few pixels."""
+    """Write a picture in 256 colours, one of them that of the queen, who has few pixels.
+
+    So the history of pictures in Git stays small.
+    """
     from PIL import Image
 
     from taichi_ants.rendering.colours import CELL_QUEEN, channels
@@ -202,15 +205,11 @@ def _keep(picture: bytes, path: Path) -> None:
 
 
 def make_figures(folder: Path) -> None:
-    """Copy figures and tables of the studies, after running missing studies.
-
-    They have 256 colours, so that their history in Git stays small.
-    """
+    """Copy figures and tables of the studies, after running missing studies."""
     import bridge
     import colony
     import compare
     import published
-    from PIL import Image
 
     from taichi_ants.studies.command import planned, run_study
 
@@ -221,11 +220,8 @@ def make_figures(folder: Path) -> None:
         for table in (settings.out / "tables").glob("*.json"):
             shutil.copy(table, published.data_file(table.stem))
     published.fill()
-    folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
-        with Image.open(results / source) as image:
-            image.convert("RGB").quantize(256).save(folder / name, optimize=True)
-        print(f"{folder / name}: {(folder / name).stat().st_size // 1000} kB")
+        _keep((results / source).read_bytes(), folder / name)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,6 @@ LATE_RATIO = 2.0
 AS_PUBLISHED = 1000  # ants that choose
 N_CLASSES = 5
 SHORT_CELLS = 10  # 2 seconds each
-MOST_CHOICES = 1 << 32  # of all colonies together; each takes a byte
 _LAUNCH = 1 << 14  # colonies per launch, which takes less than half a second
 
 
@@ -166,11 +165,6 @@ def print_table(settings: argparse.Namespace) -> None:
     if n % 2:
         raise AntsError(
             f"--choices is {n}; it must be even, because half of the ants choose at each end."
-        )
-    if 2 * n * colonies > MOST_CHOICES:
-        raise AntsError(
-            f"--choices {n} with --colonies {colonies} needs {2 * n * colonies / 1e9:.0f} GB; "
-            f"their product must be at most {MOST_CHOICES // 2}, so reduce either of them."
         )
     cases = [(str(r), r, 0, theirs) for r, theirs in PUBLISHED.items()]
     cases += [(f"{LATE_RATIO}, opens late", LATE_RATIO, n, PUBLISHED_LATE)]

@@ -79,20 +79,12 @@ def pages() -> list[Path]:
 
 
 def tables(name: str) -> list[Table]:
-    """Return the published tables of a name.
-
-    Raises:
-        AntsError: There are none.
-    """
+    """Return the published tables of a name; AntsError if there are none."""
     return [Table(**table) for table in json.loads(read_text(data_file(name)))]
 
 
 def filled(text: str) -> str:
-    """Return the text of a page with the published tables and numbers.
-
-    Raises:
-        AntsError: A number is not in exactly one row of the published tables.
-    """
+    """Return the text of a page with published tables and numbers; AntsError if one is unclear."""
 
     def table(mark: re.Match[str]) -> str:
         found = "\n".join(table.markdown() for table in tables(mark[2]))

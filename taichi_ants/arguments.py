@@ -8,18 +8,8 @@ from numbers import Real
 
 import numpy as np
 
-from taichi_ants import learners
-from taichi_ants.errors import (
-    AntsError,
-    check_one_of,
-    checked_flag,
-    checked_whole,
-    count,
-    entries_of,
-    expect,
-    refuse,
-    shown,
-)
+from taichi_ants import errors, learners
+from taichi_ants.errors import AntsError, checked_whole, count, entries_of, expect, refuse, shown
 from taichi_ants.features.support import BASE, CASTES, COLONY, LONE, refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
@@ -96,9 +86,9 @@ def checked_capacity(
 ) -> int:
     """Return the largest number of ants at once; the arguments are those of `Colony`."""
     checked_whole("ants", ants, 1, MAX_ANTS)
-    check_one_of("start", start, STARTS)
+    errors.check_one_of("start", start, STARTS)
     births = task.life.births
-    if checked_flag("ends_at_delivery", ends_at_delivery) and (ants != 1 or births):
+    if errors.checked_flag("ends_at_delivery", ends_at_delivery) and (ants != 1 or births):
         raise AntsError(
             f"ends_at_delivery is True with {ants} ants and births {births}; it requires one ant "
             "and no births, so leave it out."

@@ -69,10 +69,8 @@ class Replayed(NamedTuple):
 def replay(link: str) -> Replayed:
     """Return the result of a link of the lab, which a `Colony` replays.
 
-    The link is an address that the lab has copied, or its part after "#".
-
-    Raises:
-        AntsError: The link is damaged, or is not one of the lab.
+    The link is an address that the lab has copied, or its part after "#". Raises AntsError if it is
+    damaged, or is not one of the lab.
 
     >>> link = "AQAPVUAeZIQHAQrYBAECwwII_hAeAB4ABTYAHgUWABYABS4AHgUWACYAByEJ3gwHBARkABy2BwAsBA"
     >>> replay(link + ";433;bcf73002ff82a05c").hash

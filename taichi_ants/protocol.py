@@ -171,8 +171,7 @@ def checked_protocol(protocol: Any) -> tuple[ProtocolEvent, ...]:
 def read(tables: Mapping[str, Sequence[Any]]) -> tuple[ProtocolEvent, ...]:
     """Return the events of lists of tables by the names in `EVENTS`; those of `at` come first.
 
-    Raises:
-        AntsError: A setting is not allowed; the message names the table by its number, from 1.
+    AntsError, which names the table by its number, from 1, if a setting is not allowed.
     """
     return tuple(
         _event(kind, table, number)

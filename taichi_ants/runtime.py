@@ -129,7 +129,6 @@ def stop() -> None:
 
 
 def _exists(kinds: tuple[type, ...]) -> bool:
-    """Return whether an object of one of these types exists."""
     # There are half a million objects, but only a few thousand types.
     types = {type(thing) for thing in gc.get_objects()}
     return any(issubclass(one, kinds) for one in types)

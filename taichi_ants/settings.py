@@ -25,6 +25,7 @@ import difflib
 import math
 import operator
 import os
+import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, replace
@@ -33,21 +34,7 @@ from inspect import Signature, cleandoc, signature
 from numbers import Real
 from textwrap import fill
 from types import NoneType, UnionType
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    ClassVar,
-    Generic,
-    Literal,
-    NamedTuple,
-    TypeGuard,
-    TypeVar,
-    Union,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
 
 from taichi_ants.errors import AntsError, check_word, entries_of, is_flag, refuse, shown
 
@@ -260,7 +247,7 @@ class _Signature:
     def __get__(self, _: object, cls: Any) -> Signature:
         if not _is_ready(cls):
             raise AttributeError("__signature__")
-        hints = get_type_hints(cls)
+        hints = typing.get_type_hints(cls)
         _, *arguments = signature(cls.__init__).parameters.values()
         return Signature(
             [one.replace(annotation=hints.get(one.name, one.annotation)) for one in arguments]
@@ -488,19 +475,20 @@ def declared(cls: Any) -> tuple[DeclaredSetting, ...]:
 
 @cache
 def _read(cls: Any) -> tuple[DeclaredSetting, ...]:
-    settings, hints = [], get_type_hints(cls, include_extras=True)
+    settings, hints = [], typing.get_type_hints(cls, include_extras=True)
     for name, default in _defaults(cls):
         hint = hints.get(name)
-        if get_origin(hint) is Union:  # Python 3.10 makes arguments with the default None optional
-            hint = get_args(hint)[0]
-        if get_origin(hint) is not Annotated:
+        # Python 3.10 makes arguments with the default None optional.
+        if typing.get_origin(hint) is typing.Union:
+            hint = typing.get_args(hint)[0]
+        if typing.get_origin(hint) is not Annotated:
             continue
-        kind, *rules = get_args(hint)
+        kind, *rules = typing.get_args(hint)
         rule = reduce(Setting.replace, rules)
-        optional = get_origin(kind) in (Union, UnionType)
+        optional = typing.get_origin(kind) in (typing.Union, UnionType)
         if optional:
-            (kind,) = [part for part in get_args(kind) if part is not NoneType]
-        origin, inner = get_origin(kind), get_args(kind)
+            (kind,) = [part for part in typing.get_args(kind) if part is not NoneType]
+        origin, inner = typing.get_origin(kind), typing.get_args(kind)
         words = inner if origin is Literal else ()
         entry = inner[0] if origin is Named else NoneType
         kind = {Literal: str, Named: Named, Sequence: list}.get(origin or kind, kind)
@@ -568,7 +556,7 @@ def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
     return f"is not a setting{of}; choose {choice}."
 
 
-def is_table(value: object) -> TypeGuard[Mapping[str, Any]]:
+def is_table(value: object) -> typing.TypeGuard[Mapping[str, Any]]:
     """Return whether a value is a mapping whose names are text."""
     return isinstance(value, Mapping) and all(isinstance(name, str) for name in value)
 

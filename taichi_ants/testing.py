@@ -140,7 +140,6 @@ def _task(rule: Rule, seed: int) -> Task:
 
 
 def _common(fields: Iterable[str], drawn: int) -> Task:
-    """Return a task with further pheromones of these names."""
     return Task().replace(
         fields={name: {"deposited_when": "always"} for name in fields if name != TRAIL},
         evaporation_in_training=True,

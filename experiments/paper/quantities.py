@@ -16,16 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from paper.comparison import (
-    FACTORS,
-    FIGURE_1,
-    GRID,
-    TABLE_2,
-    VARIANTS,
-    Comparison,
-    GridPoint,
-    Variant,
-)
+from paper import comparison as paper
+from paper.comparison import FACTORS, GRID, TABLE_2, Comparison, GridPoint, Variant
 from taichi_ants.analysis.findings import UNBOUNDED, Contrast, Criterion
 from taichi_ants.analysis.statistics import interquartile_values
 from taichi_ants.measures.finished import LONE, WINDOW
@@ -114,8 +106,8 @@ READS: dict[str, Read] = {  # by their names in `claims.toml`
         lambda grids, measure, variant: _at(grids(measure, variant), TABLE_2[variant].point),
     ),
     "at figure 1": Read(
-        f"at {FIGURE_1.label}, our choice for figure 1",
-        lambda grids, *of: _at(grids(*of), FIGURE_1),
+        f"at {paper.FIGURE_1.label}, our choice for figure 1",
+        lambda grids, *of: _at(grids(*of), paper.FIGURE_1),
     ),
     "mean of all": Read(
         f"mean of {ALL}", lambda grids, *of: grids(*of).mean(axis=EVERY_CONFIGURATION)
@@ -285,7 +277,9 @@ def stronger(measure: str, factor: str) -> Quantity:
 
     def effects(other: str) -> Effect:
         reads = [READS[f"effect of {name}"].values for name in (factor, other)]
-        return lambda grids: np.stack([read(grids, measure, v) for read in reads for v in VARIANTS])
+        return lambda grids: np.stack(
+            [read(grids, measure, v) for read in reads for v in paper.VARIANTS]
+        )
 
     others = [other for other in FACTORS if other != factor]
     return Quantity(

@@ -10,18 +10,10 @@ from paper.baselines import Baseline
 from paper.claims import Audit, headlines, tallies
 from paper.comparison import DEFINITIONS, GREEDY_RETURN, GREEDY_STEPS, Comparison, counts
 from paper.table2 import FIGURES, Line
+from taichi_ants.analysis import tables as printing
 from taichi_ants.analysis.behaviour import BEHAVIOURS
 from taichi_ants.analysis.statistics import Estimator
-from taichi_ants.analysis.tables import (
-    MISSING,
-    Block,
-    Table,
-    interval,
-    number,
-    percent,
-    plain_text,
-    thousands,
-)
+from taichi_ants.analysis.tables import MISSING, Block, Table, interval, number, percent
 from taichi_ants.errors import count
 from taichi_ants.measures.finished import WINDOW
 
@@ -37,7 +29,7 @@ def report(comparison: Comparison, lines: Sequence[Line], audit: Audit) -> str:
     """Return the report of one screen, as plain text of at most `WIDTH` columns."""
     tables = _glance(lines), headlines(audit), behaviour_counts(comparison)
     claims = [f"The paper's {len(audit)} claims", *(f"  {line}" for line in tallies(audit))]
-    return plain_text([*heading(comparison), *tables, "\n".join(claims)], WIDTH)
+    return printing.plain_text([*heading(comparison), *tables, "\n".join(claims)], WIDTH)
 
 
 def heading(comparison: Comparison) -> list[Block]:
@@ -64,7 +56,7 @@ def behaviour_counts(comparison: Comparison) -> Table:
         here = [row.delivery == setting for row in comparison.rows]
         by_setting.append(counts(comparison.behaviours[here]))
     rows = [
-        [name, *(thousands(done.get(code, 0)) for done in by_setting)]
+        [name, *(printing.thousands(done.get(code, 0)) for done in by_setting)]
         for code, name in enumerate(BEHAVIOURS)
         if any(code in done for done in by_setting)
     ]

@@ -156,10 +156,7 @@ class EpisodeBounds:
         """Return the largest discounted return without a step limit, and its policy's outcome.
 
         The policy is followed for at most `max_steps` steps. Of several optimal actions, it takes
-        the one with the lowest index.
-
-        Raises:
-            AntsError: The discount is not in [0, 1).
+        the one with the lowest index. Raises AntsError unless the discount is in [0, 1).
         """
         if not 0 <= discount < 1:
             raise AntsError(

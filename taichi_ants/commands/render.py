@@ -15,16 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.studies.command_line import (
-    PLUGIN,
-    WORLDS,
-    Parser,
-    add_settings,
-    given_settings,
-    given_world,
-    progress_bar,
-    whole_number,
-)
+from taichi_ants.studies import command_line
+from taichi_ants.studies.command_line import whole_number
 from taichi_ants.studies.plugins import load_plugin
 from taichi_ants.task import Task
 
@@ -61,9 +53,9 @@ _PLAIN = {"action": "store_false", "dest": "overlay"}
 OPTIONS: dict[str, tuple[str, dict[str, Any]]] = {
     "--out": ("file to write", {"metavar": "PATH"}),
     "--title": ("title of the picture or page", {"metavar": "TEXT"}),
-    "--world": (WORLDS, {"default": "paper", "metavar": "WORLD"}),
+    "--world": (command_line.WORLDS, {"default": "paper", "metavar": "WORLD"}),
     "--seed": ("seed of training and rendering", _SEED),
-    "--plugin": (PLUGIN, {"metavar": "FILE"}),
+    "--plugin": (command_line.PLUGIN, {"metavar": "FILE"}),
     "--ants": ("number of ants", {**_COUNT, "default": 80}),
     "--follow": ("show what the ant with this number sees", {**_SEED, "default": None}),
     "--max-steps": ("step limit of the rendered episode", _LENGTH),
@@ -88,20 +80,20 @@ _DEFAULTS: dict[str, dict[str, Any]] = {
 }
 
 
-def add_options(parser: Parser, flags: Container[str], **defaults: Any) -> None:
+def add_options(parser: command_line.Parser, flags: Container[str], **defaults: Any) -> None:
     """Add the options of `OPTIONS` in `flags`, and those of a world, a task and training."""
     for flag, (words, reading) in OPTIONS.items():
         if flag in flags:
             parser.add_argument(flag, **{"help": words, **reading})
     parser.set_defaults(**defaults)
     parser.open_settings = ("world",)
-    add_settings(parser, TASK)
-    add_settings(parser, TRAINING)
+    command_line.add_settings(parser, TASK)
+    command_line.add_settings(parser, TRAINING)
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
-    parser = Parser(__doc__)
+    parser = command_line.Parser(__doc__)
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
     for kind, (shows, example) in KINDS.items():
         example = f"Example: %(prog)s {example}"
@@ -117,7 +109,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return settings
 
 
-def parse(parser: Parser, arguments: list[str] | None = None) -> argparse.Namespace:
+def parse(parser: command_line.Parser, arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of a command line with some of `OPTIONS`, which fit together."""
     settings, given = parser.parse_given(arguments)
     for flag in given.values():
@@ -144,7 +136,7 @@ def run(settings: argparse.Namespace) -> None:
     check_size(settings.size)
     load_plugin(settings.plugin)
     draw = show_episode if settings.kind == "episode" else show_colony
-    print(f"{settings.out}: {draw(settings, given_world(settings))}")
+    print(f"{settings.out}: {draw(settings, command_line.given_world(settings))}")
 
 
 def show_episode(settings: argparse.Namespace, world: World) -> str:
@@ -178,7 +170,7 @@ def show_colony(settings: argparse.Namespace, world: World) -> str:
     colony.begin_episode()
     ticks, every, follow = settings.ticks, settings.frame_interval, settings.follow
     if is_page(settings):
-        with progress_bar("Recording") as progress:
+        with command_line.progress_bar("Recording") as progress:
             more: dict[str, Any] = {"title": title, "follow": follow, "progress": progress}
             recording = record_colony(colony, ticks, every, **more)
         save_page(settings.out, recording)
@@ -203,7 +195,7 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
     learner = learners.registry.label(config.learner)
     title = settings.title or f"{learner} after {count(episodes, 'episode')}"
-    with progress_bar("Training") as progress:
+    with command_line.progress_bar("Training") as progress:
         task = given_task(settings)
         if settings.kind != "colony":
             result = train(world, config, seed, episodes, task=task, progress=progress)
@@ -216,12 +208,12 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
 
 def given_task(settings: argparse.Namespace) -> Task:
     """Return the task with the given options."""
-    return TASK.replace(**given_settings(settings).get("task", {}))
+    return TASK.replace(**command_line.given_settings(settings).get("task", {}))
 
 
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
     """Return the training configuration with the given options."""
-    return TRAINING.replace(**given_settings(settings).get("training", {}))
+    return TRAINING.replace(**command_line.given_settings(settings).get("training", {}))
 
 
 def _save_snapshots(
@@ -250,5 +242,5 @@ def save_frames(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n:
             yield picture
             progress(done / n)
 
-    with progress_bar("Rendering") as progress:
+    with command_line.progress_bar("Rendering") as progress:
         save_animation(settings.out, counted(), settings.fps, pause=PAUSE)

@@ -36,11 +36,7 @@ def run(settings: argparse.Namespace) -> None:
 
 
 def status(folder: Path) -> Iterator[str]:
-    """Yield lines about a folder of results.
-
-    Raises:
-        AntsError: The folder has no study, or its description is damaged.
-    """
+    """Yield lines about a folder of results; AntsError if it has no study, or a damaged one."""
     asked, store, sessions = asked_in(folder), Store(folder), sessions_in(folder)
     numbers, blocks = store.where(asked["points"], asked["seeds"], asked["arrays"])
     done, manifest = numbers >= 0, json_in(folder / MANIFEST)

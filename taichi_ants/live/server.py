@@ -232,7 +232,6 @@ class SessionServer:
             self._send(_message("error", words=job.result), to=job.page)
 
     async def _advance_frame(self) -> None:
-        """Advance by the ticks of one frame, and show it."""
         began, before = time.monotonic(), self.session.steps
         if self.speed >= FASTEST:
             ticks = self._steps_per_frame()
@@ -368,7 +367,6 @@ class SessionServer:
             page.begin(*messages)
 
     def _show(self, frame: bytes) -> None:
-        """Send a frame to all pages except those that are behind."""
         for page in self.pages:
             page.show(frame)
 
@@ -390,7 +388,6 @@ class SessionServer:
         )
 
     def _send(self, *messages: str | bytes, to: Page | None = None) -> None:
-        """Send messages to a page, or to all."""
         for page in [to] if to else self.pages:
             page.send(*messages)
 
@@ -425,7 +422,6 @@ class SessionServer:
         return response
 
     async def _handle_messages(self, connection: ServerConnection) -> None:
-        """Handle the messages of a page, one after the other."""
         from websockets.exceptions import ConnectionClosed
 
         page = Page(connection)

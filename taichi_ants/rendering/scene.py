@@ -158,10 +158,8 @@ class Scene:
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """Return the picture of a snapshot and its panel, uint8 (height, width, 3).
 
-        The panel shows the text of `status`, if one is given.
-
-        Raises:
-            AntsError: An argument is of the wrong kind, or the snapshot has another grid.
+        The panel shows the text of `status`, if one is given. Raises AntsError if an argument is of
+        the wrong kind, or the snapshot has another grid.
         """
         expect("the snapshot", snapshot, Snapshot)
         expect("status", status, Status, type(None))

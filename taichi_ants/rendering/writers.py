@@ -101,8 +101,7 @@ def save_animation(
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     """Write a picture to a PNG file; a `frame` is uint8 (height, width, 3).
 
-    Raises:
-        AntsError: The file does not end in .png, or is not writable.
+    Raises AntsError if the file does not end in .png, or is not writable.
 
     >>> rendering.save_picture("world.png", rendering.picture(worlds.paper(), size=(320, 240)))
     """

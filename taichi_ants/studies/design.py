@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, refuse
 from taichi_ants.settings import Flag, Setting, Settings
 
 _GRID, _DRAWN = ("design", "grid"), ("design", "sobol")  # conditions of keys
@@ -34,11 +34,9 @@ class Range:
         fits = all(type(end) in (int, number) and abs(end) <= 2**53 for end in ends)
         fits = fits and low < high and scale in ("linear", "log")[: 1 + (low > 0)]
         if not fits or table.keys() - {"from", "to", "scale"}:
-            raise AntsError(
-                f"{name} is {shown(dict(table))}; a range has the keys from and to, which are "
-                f"{'whole ' * whole}numbers, the first the smaller one, and perhaps the scale "
-                "linear or, if both are above 0, log."
-            )
+            numbers = f"{'whole ' * whole}numbers, the first the smaller one"
+            keys = f"the keys from and to, which are {numbers}, and perhaps the scale"
+            refuse(name, dict(table), f"a range with {keys} linear or, if both are above 0, log")
         return cls(number(low), number(high), scale == "log", whole)
 
 

@@ -28,10 +28,7 @@ def read_plugin(path: str | None) -> dict[str, bytes]:
     """Return the contents of a plugin, if any, and then of the files that it needs.
 
     These are the modules and packages of its folder that it imports, and `NAME*.toml` and
-    `NAME*.html` for NAME.py.
-
-    Raises:
-        AntsError: A file cannot be read, or has the name of an installed module.
+    `NAME*.html` for NAME.py. AntsError if one cannot be read, or has an installed module's name.
     """
     if path is None:
         return {}
@@ -73,8 +70,7 @@ def _needed(folder: Path, path: Path, content: bytes) -> Iterator[Path]:
 def load_plugin(path: str | None, code: Code | None = None) -> Any:
     """Return the module of a Python file, after running it, or None; `code` is as read before.
 
-    Raises:
-        AntsError: The file cannot be read, raises or exits.
+    AntsError if the file cannot be read, raises or exits.
     """
     if path is None:
         return None
@@ -112,11 +108,7 @@ def _let_import(path: Path, name: str) -> None:
 
 
 def load_code(codes: Iterable[Code]) -> None:
-    """Load code that came to this process as bytes, unless it has loaded it before.
-
-    Raises:
-        AntsError: A file raises, or the process has loaded another file of this name.
-    """
+    """Load code that came as bytes, if it is new; AntsError if another file has its name."""
     for code in codes:
         name, contents = Path(next(iter(code))).name, [*code.values()]
         if _loaded.setdefault(name, contents) != contents:

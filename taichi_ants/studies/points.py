@@ -414,7 +414,6 @@ def _changed(value: Any) -> dict[str, Any]:
 
 @lru_cache(4096)
 def _sum_of(world: World) -> str:
-    """Return a checksum of all cells and regions of a world."""
     regions = {name: cells.tolist() for name, cells in world.regions.items()}
     return files.checksum_of_json([world_facts(world), regions])[:32]
 

@@ -17,18 +17,10 @@ import numpy as np
 
 from taichi_ants import arguments
 from taichi_ants.errors import AntsError, count, shown
-from taichi_ants.features.support import COLONY, LONE
+from taichi_ants.features.support import COLONY
 from taichi_ants.studies.executors import completed
 from taichi_ants.studies.plugins import Code
-from taichi_ants.studies.points import (
-    ColonyPoint,
-    Drawn,
-    Point,
-    Progress,
-    chain,
-    columns_of,
-    key_of,
-)
+from taichi_ants.studies.points import Drawn, Point, Progress, chain, columns_of, key_of
 from taichi_ants.studies.store import Arrays, Store, parts_of
 
 Q_VALUES = "q_values"
@@ -72,8 +64,7 @@ class Study:
         object.__setattr__(self, "arrays", tuple(self.arrays))
         if not self.points:
             raise AntsError("`points` is empty; give at least one point.")
-        is_colony = isinstance(self.points[0], ColonyPoint)
-        who = ("a colony", COLONY) if is_colony else ("a run of one ant", LONE)
+        who = {"colony": ("a colony", COLONY), "runs": arguments.ALONE[:2]}[self.points[0].kind]
         for world, pool, ants in dict.fromkeys((p.world, p.pool, p.ants) for p in self.points):
             worlds: Any = map(world.of, self.seeds) if isinstance(world, Drawn) else [world]
             starts = [*zip(worlds, self.seeds, strict=False), *((drawn, 0) for drawn in pool or ())]

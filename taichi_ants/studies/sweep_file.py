@@ -8,53 +8,22 @@ from dataclasses import fields
 from typing import Any, NamedTuple
 
 from taichi_ants import arguments, interventions, measures, protocol, rules, worlds
+from taichi_ants import settings as declarations
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, refuse, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
 from taichi_ants.measures.measure import RUN
-from taichi_ants.settings import (
-    DeclaredSetting,
-    all_of,
-    declared,
-    flat,
-    named_groups,
-    nested,
-    not_a_setting,
-    settings_of_entry,
-)
+from taichi_ants.settings import DeclaredSetting, declared, flat, named_groups, nested
 from taichi_ants.studies.design import Axis, Design, Range
 from taichi_ants.studies.points import ColonyPoint, Drawn, FixedPolicy, Point, RunPoint
 from taichi_ants.task import Task
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
-# Keys that are not settings of points; docs/reference/sweep_keys.md shows them.
-KEYS = {
-    "kind": '`"runs"` for lone ants, which are trained and then followed greedily, or `"colony"` '
-    "for many ants in one world, which learn and are then evaluated with frozen action values",
-    "measures": "one or more measures of this kind; figures show the first",
-    "measure_every": 'time between the values in `series.csv`, in ticks; kind `"colony"`, off by '
-    "default",
-    "seeds": "the number of seeds (0, 1, 2 ...), 10 by default, or a list of them",
-    "vary": "the settings that vary: in a table `[vary]`, or in several `[[vary]]`, each with its "
-    "own combinations",
-    "against": "the baseline: a setting of `[vary]` with one of its values",
-    **{
-        key.name: f"{key.rule.help}; {key.in_words[0]} (default: {key.in_words[1]})"
-        for key in declared(Design)
-    },
-}
-# Settings of points whose values are read in another form.
-WORLD_KEYS = {
-    "world.preset": 'a registered name, `"paper"` by default, or the path of a map relative to the '
-    "folder in which you run the command",
-    "world.seed": "the seed of a world that is drawn at random; 0 by default",
-    "world.per_seed": 'draw a world for each seed, from `world.seed` + seed; kind `"colony"`',
-    "world.regions": "regions that the world gets: a list of cells, or `{centre = [x, y, z], "
-    "radius = 3}`, by name",
-    "task.preset": 'the task to start from, `"paper"` by default; other keys of `task` change it',
-    "policy": "with `episodes = 0`, and without `[training]`: the policy that ants follow, a file "
-    '(`"policy.npz"`), `"trail_follower"` or `"random"`',
-}
+# Keys that are not settings of points; docs/reference/sweep_keys.toml has their meanings.
+KEYS = [
+    *("kind", "measures", "measure_every", "seeds", "vary", "against"),
+    *(key.name for key in declared(Design)),
+]
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
 # Measures of reward, and the deliveries that sweeps report beside them: ants can collect rewards
@@ -113,9 +82,8 @@ class Base(NamedTuple):
     def axes(self, table: Any) -> dict[str, Axis]:
         """Return the values or ranges of the settings in a [vary] table, by their full names.
 
-        Raises:
-            AntsError: A range is not allowed, or a setting is fixed, too, or of an event, field,
-                caste or food without a table in the file. Points check values.
+        AntsError if a range is not allowed, or a setting is fixed, too, or of an event, field,
+        caste or food without a table in the file. Points check values.
         """
         if not isinstance(table, dict) or not table:
             raise AntsError("[vary] is empty; add lists of values of the settings that vary.")
@@ -159,7 +127,7 @@ class Base(NamedTuple):
         for name in tree:  # the world, task, training and events check theirs
             if name not in known:
                 of = f"a sweep of kind {self.kind!r}"
-                raise AntsError(f"{name!r} {not_a_setting(name, [*known, *KEYS], of)}")
+                raise AntsError(f"{name!r} {declarations.not_a_setting(name, [*known, *KEYS], of)}")
         preset = task.pop("preset", "paper")
         check_one_of("task.preset", preset, tuple(Task.named()))
         task = Task.named()[preset].replace(**task)
@@ -233,12 +201,12 @@ def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:
     else:
         preset = fixed.get("world.preset", "paper")
         of_world = worlds.registry.settings_of(preset) if preset in worlds.names() else ()
-        known = [*all_of(Task), *declared(TrainingConfig), *of_world]
+        known = [*declarations.all_of(Task), *declared(TrainingConfig), *of_world]
         for named in named_groups(Task):
             entry = re.match(rf"{named.path}\.([^.]+)\.", path)
             # The parameters of rules that are not registered are unknown.
             if entry and (named.path != "task.rules" or entry[1] in rules.names()):
-                known += settings_of_entry(named, entry[1]).values()
+                known += declarations.settings_of_entry(named, entry[1]).values()
     return next((s._replace(path=name) for s in known if s.path == path), None)
 
 

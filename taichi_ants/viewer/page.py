@@ -124,8 +124,7 @@ def check_page(path: files.PathLike) -> Path:
 def save_page(path: files.PathLike, recording: Recording) -> None:
     """Write the page that plays a recording; an existing file is replaced.
 
-    Raises:
-        AntsError: The file does not end in .html, or is not writable.
+    Raises AntsError if the file does not end in .html, or is not writable.
 
     >>> viewer.save_page("ants.html", viewer.record_colony(colony, ticks=2))
     """

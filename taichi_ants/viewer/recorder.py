@@ -101,7 +101,6 @@ class Recorder:
 
     @property
     def _marks(self) -> list[tuple[Feature, Mark]]:
-        """The marks of the features of the task."""
         return [(feature, mark) for feature in used_by(self.colony.task) for mark in feature.marks]
 
     def header(self) -> dict[str, Any]:

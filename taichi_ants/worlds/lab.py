@@ -57,7 +57,6 @@ def distance(q: int, r: int) -> int:
 
 
 def _drawn(lab: dict[str, Any], seed: int) -> Iterator[tuple[int, ...]]:
-    """Yield rocks and piles at random places."""
     words = (_word(seed, number) for number in count())
     radius, queen = lab["radius"], lab["queen"]
 
@@ -75,7 +74,6 @@ def _drawn(lab: dict[str, Any], seed: int) -> Iterator[tuple[int, ...]]:
 
 
 def _word(seed: int, number: int) -> int:
-    """Return a random word of 32 bits."""
     word = ((seed ^ 0x9E3779B9) * 0x85EBCA6B ^ (number + 0x7F4A7C15) * 0xC2B2AE35) & _WORD
     word = (word ^ word >> 15) * 0x2C1B3C6D & _WORD
     word = (word ^ word >> 12) * 0x297A2D39 & _WORD

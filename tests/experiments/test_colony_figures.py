@@ -68,8 +68,8 @@ def test_a_line_shows_the_largest_colony_of_a_design(rows, name, designs) -> Non
             assert marks[place].get_xdata() == [200]
     caption = " ".join(figure._supxlabel.get_text().split())
     assert (
-        "Means over 6 seeds, too few for a verdict, with 95 % intervals. Exploration rate 0.01."
-        in caption
+        "Means over 6 seeds with 95 % intervals (too few for these: use 10 or more). Exploration "
+        "rate 0.01." in caption
     )
     titles = [axis.get_title(loc="left") for axis in figure.axes]
     assert titles == ["The paper's world", "Open worlds (30, 30, 30)"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bridge_report import BRIDGES, LOADS, WINDOWS, Case, rows
 from colony_findings import condition_rows, difference_rows, judge_all, rows_of_seeds
-from columns import BRIDGE, COLONY, COMPARE
+from command_lines import TABLES, undeclared
 from paper.baselines import Baseline
 from paper.claims import CLAIMS, assess, claims_rows
 from paper.table2 import summarise, summarise_behaviours, table2
@@ -14,7 +14,6 @@ from synthetic_colony_study import build as build_study
 from synthetic_comparison import build, unchanged
 
 from taichi_ants.analysis.sensitivity import COLUMNS
-from taichi_ants.studies.columns import SWEEP, Table
 
 
 @pytest.fixture(scope="module")
@@ -38,17 +37,13 @@ def written():
     }
 
 
-TABLES = {**COMPARE, **COLONY, **BRIDGE, "sensitivity.csv": SWEEP["sensitivity.csv"]}
+DECLARED = {**TABLES["compare"], **TABLES["colony"], **TABLES["bridge"]}
+DECLARED["sensitivity.csv"] = TABLES["sweep"]["sensitivity.csv"]
 
 
-@pytest.mark.parametrize("name", TABLES)
+@pytest.mark.parametrize("name", DECLARED)
 def test_the_columns_of_a_table_are_declared_and_occur(name, written):
-    table, columns = TABLES[name], list(written[name])
-    assert table.undeclared(columns) == []
-    for declared in table.columns:
-        assert Table("", {declared: ""}).undeclared(columns) != columns, declared
-
-
-def test_a_column_that_is_not_declared_is_found():
-    table = Table("seed", {"seed": "", "MEASURE_mean": ""})
-    assert table.undeclared(["seed", "reward_mean", "seeds", "mean"]) == ["seeds", "mean"]
+    declared, columns = DECLARED[name]["columns"], list(written[name])
+    assert undeclared(declared, columns) == []
+    for one in declared:
+        assert undeclared([one], columns) != columns, one

@@ -126,7 +126,7 @@ def test_declared_whole_numbers_need_no_key():
 
 
 SLIP, HALF = "{ from = 0, to = 0.5 }", '{ from = 10, to = 1000, scale = "log" }'
-RANGE = "a range has the keys from and to"
+RANGE = "it must be a range with the keys from and to"
 WRONG = {
     "design": ('"sobol"', '"halton"', ["`design` is 'halton'", "one of grid, sobol"]),
     "samples": ("samples = 8", "", ["samples is None; it must be a power of 2"]),

@@ -170,7 +170,7 @@ cluster.shutdown()
 """
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture  # for each test, because Ray prints later that machines are gone
 def cluster(kernels):
     """A Ray cluster of nine machines, simulated on this one; writing a line kills one of them.
 
@@ -206,7 +206,6 @@ def test_two_of_eight_machines_die(plain, running, cluster, tmp_path):
 
 @pytest.mark.long
 def test_a_dead_head_ends_the_command_with_a_sentence(plain, running, kernels, cluster, tmp_path):
-    """The last test of the cluster, which does not survive it."""
     process = running("--ray", cluster.address)
     kill(cluster.pid, "gcs_server")
     began = time.monotonic()

@@ -7,24 +7,25 @@ import csv
 import importlib
 import json
 import os
+import re
 import runpy
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import columns
 import pytest
 
 from taichi_ants import commands
-from taichi_ants.studies.columns import SWEEP
+from taichi_ants.files import tomllib
 
-TABLES = (SWEEP, columns.COMPARE, columns.COLONY, columns.BRIDGE)
 ROOT = Path(__file__).resolve().parents[2]
 EXPERIMENTS = ROOT / "experiments"
+TABLES = tomllib.loads((ROOT / "docs" / "reference" / "columns.toml").read_text("utf-8"))
+NAMES = TABLES.pop("names")
 STUDIES = ("compare", "colony", "bridge")  # scripts with studies, not commands of the package
 
 
@@ -131,13 +132,19 @@ def _ended(work: Callable[[], object], capsys: pytest.CaptureFixture[str]) -> tu
     return ended.value.code, written.out, written.err
 
 
+def undeclared(declared: Iterable[str], columns: Iterable[str]) -> list[str]:
+    """Return those of the columns that are not declared; `declared` can have `NAMES`."""
+    forms = [re.sub("|".join(NAMES), lambda m: NAMES[m[0]]["form"], name) for name in declared]
+    return [name for name in columns if not any(re.fullmatch(one, name) for one in forms)]
+
+
 def read_csv(path: Path | str) -> list[dict[str, str]]:
     """Return the rows of a CSV file, whose columns must be those that a table of its name has."""
     with open(path, newline="", encoding="utf-8") as file:
         table = csv.DictReader(file)
         rows, heads = list(table), table.fieldnames or ()
-    of_name = [one[Path(path).name] for one in TABLES if Path(path).name in one]
-    assert not of_name or [] in [one.undeclared(heads) for one in of_name], heads
+    of_name = [one[Path(path).name] for one in TABLES.values() if Path(path).name in one]
+    assert not of_name or [] in [undeclared(one["columns"], heads) for one in of_name], heads
     return rows
 
 
