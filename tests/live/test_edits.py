@@ -1,36 +1,21 @@
-"""Edits: colony and reference stay equal to the bit, whatever the interventions; what is wrong
-changes nothing."""
+"""Edits: ants in the way of rocks and food are moved aside.
+
+That edits keep colony and reference equal is tested in `tests/engines/colony/test_protocol.py`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from plain_interventions import Interventions as PlainInterventions
-from random_choices import NO_NOISE, NOISE
-from random_colonies import random_colony
-from random_edits import apply_to_both, random_edit
-from same_colonies import assert_equal
 
-from taichi_ants import AntsError, Colony, TrainingConfig, worlds
+from taichi_ants import Colony, TrainingConfig, worlds
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.layout import NestRow, Stage, WorldRow
 from taichi_ants.interventions import Place
-from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import foraging
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
-# Each entry needs its own kernels, see tests/engines/colony/test_against_reference.py.
-KERNELS = [
-    ("sarsa", "shared", "ants", False, "right_of_way", "strongest", "ab", ("trail", "b")),
-    ("q_learning", "frozen", "queues", False, "following", "strongest_under_carriers"),
-    ("double_q", "independent", "ants_seen", True, "blocking", "half", "aB", ("a", "B")),
-    ("dyna_q", "shared", "trail_levels", True, "blocking", "half"),
-    ("n_step_sarsa", "independent", "paper", False, "blocking", "half"),
-]
 TRAINING = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 0.9)
-MARKED = [pytest.param(one, marks=[pytest.mark.long] * (k > 0)) for k, one in enumerate(KERNELS)]
 
 
 def assert_sound(interventions: Interventions) -> None:
@@ -51,56 +36,6 @@ def assert_sound(interventions: Interventions) -> None:
     later = interventions.world()
     assert (later.closer() == arrays["closer"]).all()
     assert np.count_nonzero(later.ground() == EMPTY) >= interventions.ants
-
-
-@pytest.mark.parametrize("kernel", MARKED, ids=lambda kernel: "-".join(map(str, kernel[:4])))
-def test_edits_keep_colony_and_reference_equal(kernel):
-    learner, sharing, observation, dense, traffic, view, *fields = kernel
-    done, refused = {}, 0
-    for seed in range(5):
-        rng = np.random.default_rng(seed)
-        drawn = random_colony(
-            *(seed, 12, sharing, 5, None, learner, observation, dense),
-            traffic=traffic,
-            view=view,
-            changes=True,
-            choice="softmax" if learner == "q_learning" else "greedy",
-            noise=NOISE if learner == "q_learning" else NO_NOISE,
-            **dict(zip(("fields", "cues"), fields, strict=False)),
-        )
-        population = {**drawn.population, "ends_at_delivery": False}
-        population["capacity"] = population["ants"] + int(rng.integers(0, 9))
-        rules = {**population, "sharing": sharing, "q_values": drawn.q_values}
-        task = replace(drawn.task, **{f"evaporation_in_{one}": bool(rng.random() < 0.7)
-                                      for one in ("training", "evaluation")})  # fmt: skip
-        given = (drawn.world, task, drawn.training, drawn.seed)
-        try:
-            colony = Colony(*given, **rules)
-        except AntsError:
-            continue
-        plain = ReferenceColony(*given, **rules)
-        colony.begin_episode()
-        plain.begin_episode()
-        interventions, twin = Interventions(colony), PlainInterventions(plain)
-        for _ in range(30):
-            edit = random_edit(rng, interventions)
-            before = interventions.state()
-            try:
-                twin = apply_to_both(edit, interventions, twin)
-                (kind,) = edit
-                done[kind] = done.get(kind, 0) + 1
-            except AntsError as error:
-                refused += 1
-                assert (interventions.state(), str(error)[-1]) == (before, "."), edit  # noqa: PT017
-            assert_equal(colony, plain)
-            assert_sound(interventions)
-            for _ in range(int(rng.integers(0, 3))):
-                colony.tick()
-                plain.tick()
-                assert_equal(colony, plain)
-    assert done.keys() >= {"place", "clear", "trail", "add_ants", "remove_ants", "episode"}
-    assert min(done.values()) > 1, done
-    assert refused > 3
 
 
 @pytest.mark.parametrize(("what", "content"), [("rock", OBSTACLE), ("food", FOOD)])

@@ -254,13 +254,6 @@ def test_an_observation_is_compared_with_the_reference(monkeypatch):
     assert check.difference.startswith("seed 0, tick ")
 
 
-@pytest.mark.long  # whole models have such rules, too
-@pytest.mark.parametrize("name", ["alarm", "hungry", "demanded"])
-def test_rules_that_read_other_fields_and_labour_equal_the_reference(name, monkeypatch):
-    monkeypatch.setattr(testing, "SEEDS", 2 if name == "alarm" else testing.SEEDS)
-    assert check_rule(name, 100).difference == ""
-
-
 def test_every_input_is_used_by_the_rules_of_the_tests():
     used = {kind: set() for kind in KINDS}
     for name in rules.names():

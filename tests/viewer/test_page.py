@@ -8,8 +8,8 @@ import re
 import numpy as np
 import pytest
 
-from taichi_ants import commands, worlds
-from taichi_ants.learners.policies import save_policy, trail_follower
+from taichi_ants import worlds
+from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
 from taichi_ants.viewer import page, record_trace
 from taichi_ants.viewer.page import part
@@ -54,20 +54,3 @@ def test_notebooks_show_recordings(episode):
     assert shown.startswith("<iframe ")
     assert html.unescape(re.search(r'title="([^"]*)"', shown)[1]) == TITLE
     assert html.unescape(re.search(r'srcdoc="([^"]*)"', shown)[1]) == page(episode)
-
-
-def test_the_command_writes_pages(tmp_path, capsys):
-    policy = tmp_path / "policy.npz"
-    save_policy(policy, trail_follower(), {})
-    ant, ants = tmp_path / "new" / "ant.html", tmp_path / "ants.HTML"
-    given = ["--policy", str(policy), "--out"]
-    for arguments in (
-        ["episode", *given, str(ant), "--title", "walks"],
-        ["colony", *given, str(ants), "--ants", "3", "--ticks", "9", "--follow", "2"],
-    ):
-        with pytest.raises(SystemExit) as done:
-            commands.run("render", arguments)
-        assert done.value.code == 0
-    assert capsys.readouterr().out.startswith(f"{ant}: 34 steps, return 45, delivered\n")
-    assert "<title>walks</title>" in ant.read_text(encoding="utf-8")
-    assert ants.read_text(encoding="utf-8").endswith("</html>\n")
