@@ -22,16 +22,21 @@ from taichi_ants import (
     World,
     load_policy,
     rules,
+    worlds,
 )
 from taichi_ants import task as tasks
+from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.engines.colony.layout import NestRow, Stage, WorldRow
 from taichi_ants.features.rule import RULES
 from taichi_ants.files import archives
+from taichi_ants.interventions import Place
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.live import session as session_module
 from taichi_ants.live.choices import sliders
 from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
 from taichi_ants.settings import Setting
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.viewer import Recording
 from taichi_ants.viewer.frames import CLOCK, POINT
 from taichi_ants.worlds import text_map
@@ -87,6 +92,27 @@ def _registered():
     RULES.yours.pop("live_bump")
 
 
+def assert_sound(interventions: Interventions) -> None:
+    """What holds in every colony at the end of a tick."""
+    colony = interventions.colony
+    arrays, world = colony.arrays, colony.arrays["worlds"][:, 0]
+    taken = arrays["stage"] != Stage.VACANT
+    cells, numbers = arrays["cell"][taken], arrays["number"][taken]
+    assert (arrays["stage"][taken] == Stage.LIVING).all()
+    assert len(set(cells.tolist())) == len(set(numbers.tolist())) == world[WorldRow.LIVING]
+    assert numbers.max(initial=-1) < world[WorldRow.NEXT_NUMBER]
+    assert (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all()
+    bare = colony.snapshot().ground
+    assert (arrays["walls"] == (bare == OBSTACLE)).all()
+    queens = colony.arrays["nests"][NestRow.QUEEN_CELL].tolist()
+    assert np.flatnonzero(bare == QUEEN).tolist() == sorted(queens)
+    assert colony.snapshot().trail[bare == OBSTACLE].sum() == 0
+    later = interventions.world()
+    closer = [later.closer(nest) for nest in range(colony.n_nests)]
+    assert (np.concatenate(closer) == arrays["closer"]).all()
+    assert np.count_nonzero(later.ground() == EMPTY) >= interventions.ants
+
+
 def with_edits(setup: Setup, n: int, seed: int = 0) -> Session:
     """A session after n edits drawn at random, and some ticks between them."""
     session, rng = Session(setup), np.random.default_rng(seed)
@@ -95,6 +121,7 @@ def with_edits(setup: Setup, n: int, seed: int = 0) -> Session:
             session.apply(random_edit(rng, session.interventions), goes_on=rng.random() < 0.2)
         except AntsError:
             continue
+        assert_sound(session.interventions)
         for _ in range(int(rng.integers(0, 3))):
             session.advance(int(rng.choice([1, 1, 9])))
     return session
@@ -421,3 +448,30 @@ def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
     ]
     assert told == [counted, counted]
     assert counted > 0
+
+
+@pytest.mark.parametrize(("what", "content"), [("rock", OBSTACLE), ("food", FOOD)])
+def test_a_wall_across_a_road_of_ants_has_no_hole(what, content):
+    """Ants in the way are moved aside, to the nearest empty cells; nothing else of them changes."""
+    colony = Colony(worlds.paper(), tasks.foraging(), LEARNS, 2, ants=40)
+    colony.begin_episode()
+    colony.tick(200)
+    interventions = Interventions(colony)
+    before = {name: colony.arrays[name].copy() for name in colony._columns()}
+    cells = np.sort(before["cell"])[::2]
+    interventions.apply(Place(what, cells.tolist()))
+    assert (colony.snapshot().ground[cells] == content).all()
+    for name in before.keys() - {"cell", "state", "paper_state"}:
+        assert np.array_equal(colony.arrays[name], before[name]), name
+    moved = before["cell"] != colony.arrays["cell"]
+    assert np.array_equal(moved, np.isin(before["cell"], cells))
+    assert_sound(interventions)
+
+
+def test_an_ant_without_room_stays_where_it_is():
+    colony = Colony(worlds.from_text("Q   0   F\n"), tasks.foraging(), LEARNS, ants=1)
+    colony.begin_episode()
+    interventions, (cell,) = Interventions(colony), colony.snapshot().ant_cells
+    interventions.apply(Place("rock", [cell]))
+    assert colony.snapshot().ground[cell] == EMPTY
+    assert colony.snapshot().ant_cells.tolist() == [cell]
