@@ -13,7 +13,7 @@ import pytest
 from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from same_steps import assert_same
+from same_steps import assert_same, likely
 
 from taichi_ants import AntsError, Pheromone, Task, World, task, worlds
 from taichi_ants.envs import Event, Reason
@@ -33,13 +33,6 @@ SETTINGS: list[dict[str, Any]] = [
 ]
 
 
-def sensible(rng: np.random.Generator, masks: np.ndarray) -> np.ndarray:
-    """Actions that can succeed, most of the time."""
-    any_of_them = rng.integers(0, 5, len(masks))
-    good = [rng.choice(np.flatnonzero(mask)) for mask in masks]
-    return np.where(rng.random(len(masks)) < 0.8, good, any_of_them)
-
-
 @pytest.mark.parametrize("settings", SETTINGS, ids=["paper", "foraging", "adding"])
 @pytest.mark.parametrize("mode", AutoresetMode, ids=lambda mode: mode.value)
 def test_many_ants_equal_single_environments(mode, settings):
@@ -57,7 +50,7 @@ def test_many_ants_equal_single_environments(mode, settings):
     assert_same(first, other)
     masks, delivered = first[1]["action_mask"], 0
     for step in range(100):
-        actions = sensible(rng, masks)
+        actions = likely(rng, masks)
         now, then = ours.step(actions), theirs.step(actions)
         assert_same(now, then, f"step {step}")
         delivered += (now[4]["event"] == Event.DELIVERED).sum()

@@ -56,7 +56,7 @@ MODELS = {
         (2, 2, False), (3, False, [("B", "a"), ("trail", "compass")]), {}),
 }  # fmt: skip
 NAMES = ("learner", "sharing", "traffic", "dense", "fields")
-SLOW = ("labour of users",)
+SLOW = ("labour of users", "rewards of users")
 
 
 def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[ProtocolEvent]] | None:
@@ -110,6 +110,7 @@ def steps_compared(
 @pytest.mark.parametrize(
     ("name", "ant_steps"),
     [
+        ("rules of users", 1_500),
         *(pytest.param(name, 6_000, marks=pytest.mark.slow) for name in SLOW),
         # Two million in all, in ten minutes.
         *(pytest.param(name, 340_000, marks=pytest.mark.long) for name in MODELS),

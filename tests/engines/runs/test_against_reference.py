@@ -172,10 +172,6 @@ def test_whole_trainings_of_a_mixed_sweep():
     [
         ("q_learning", "paper", "set", "greedy", NO_NOISE),
         ("sarsa", "paper", "fading", "greedy", NOISE),
-        pytest.param("sarsa", "ants", "add", "softmax", NO_NOISE, marks=pytest.mark.slow),
-        pytest.param(
-            "expected_sarsa", "trail_levels", "set", "greedy", NOISE, marks=pytest.mark.slow
-        ),
     ],
 )
 def test_many_runs_equal_single_ones(learner, observation, deposit, choice, noise, monkeypatch):
