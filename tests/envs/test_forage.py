@@ -88,7 +88,7 @@ def test_infos_have_the_same_numbers_after_each_reset_and_step():
     kinds["action_mask"] = np.ndarray
     _, info = env.reset(seed=0)
     codes = [(info["event"], info["reason"])]
-    for action in (3, 4, 1, 1, 3, 3, 4, 1, 1, 4):
+    for action in (3, 4, 0, 2, 1, 3, 3, 4, 1, 1, 4):
         *_, terminated, truncated, info = env.step(action)
         assert {name: type(value) for name, value in info.items()} == kinds
         codes.append((info["event"], info["reason"]))
@@ -96,6 +96,7 @@ def test_infos_have_the_same_numbers_after_each_reset_and_step():
         (Event.NONE, Reason.NONE),
         (Event.FAILED, Reason.NO_FOOD_IN_VIEW),
         (Event.FAILED, Reason.CARRIES_NO_FOOD),
+        (Event.BLOCKED, Reason.ROCK_OR_EDGE_AHEAD),
         (Event.ENTERED_EMPTY, Reason.NONE),
         (Event.BLOCKED, Reason.FOOD_AHEAD),
         (Event.PICKED_UP, Reason.NONE),

@@ -324,13 +324,8 @@ def test_wrong_edits_change_nothing():
     for edit, said in WRONG:
         assert said in refused(session, edit), edit
     follows = Session(SETUPS["queueing"])
-    assert sliders(follows.interventions).keys() == {
-        "ants",
-        "epsilon",
-        "deposit",
-        "slope",
-        "evaporation",
-    }
+    shown = ["ants", "deposit", "epsilon", "evaporation", "slope"]
+    assert sorted(sliders(follows.interventions)) == shown
     assert "no learning rate" in refused(follows, {"learning_rate": 0.5})
 
 
@@ -382,14 +377,11 @@ def test_a_file_that_unpacks_to_much_more_is_refused(edited, monkeypatch):
         ({"world": "Q ?\n"}, "'?'"),
         ({"world": "open", "world_settings": {"ranges": [9000, 9000, 1]}}, "81036004 cells"),
         ({"world": "open", "world_settings": {"size": 3}}, "`world.size` is not a setting"),
-        ({"task": {"gravity": 1}}, "gravity"),
         ({"policy": {**LEARNS.as_dict(), "epsilon": 3}}, "`training.epsilon` is 3"),
-        ({"ants": 0}, "ants is 0"),
         (
             {"capacity": 100_000, "sharing": "independent", "task": {"observation": "six_cells"}},
             "action values in independent tables",
         ),
-        ({"sharing": "frozen"}, "sharing is 'frozen'"),
     ],
 )
 def test_wrong_setups_say_why(changes, said):
