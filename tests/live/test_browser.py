@@ -374,7 +374,8 @@ def test_every_control_is_reached_by_keyboard_and_has_a_name(page):
     for control in (
         *("world-name", "task", "policy", "ants", "episode", "seed", "begin", "restart"),
         *("set-epsilon", "set-ants", "next-episode", "session", "load", "page", "gif", "policy"),
-        *("colony", "quit", "look", "rock", "queen", "play", "speed"),
+        *("colony", "quit", "look", "rock", "queen", "play", "speed", "help-button", "world"),
+        *("zoom-in", "zoom-out", "fit", "forward", "time"),
     ):
         assert control in reached
     del reached["BODY"]
