@@ -142,13 +142,3 @@ def test_numbers_of_castes_change_in_an_episode():
     for name, fixed in (("share", 0.25), ("policy", "random"), ("threshold", Threshold())):
         with pytest.raises(AntsError, match=f"cannot change castes.a.{name}"):
             interventions.apply(SetTask(((f"castes.a.{name}", fixed),)))
-
-
-def test_what_does_not_fit_is_refused():
-    minor, follows_table = Task(castes={"minor": {}}), Task(castes={"a": {"policy": "random"}})
-    with pytest.raises(AntsError, match=r"`task.castes` has minor, which a colony with given act"):
-        Colony(worlds.paper(), minor, sharing="frozen")
-    with pytest.raises(AntsError, match=r"^`task\.castes\.a\.policy` is .random., but sharing is"):
-        Colony(worlds.paper(), follows_table, TRAINING, sharing="independent")
-    with pytest.raises(AntsError, match="the castes have 3 ants in nest 0, but 5 ants start there"):
-        follows(Task(castes={"a": {"ants": 3}}), ants=5)
