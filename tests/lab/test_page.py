@@ -363,8 +363,7 @@ def test_a_course_page_steers_the_lab_in_a_frame(browser, tmp_path):
     course.write_text(f'<iframe src="{FILE.as_uri()}?bare" width=700 height=600></iframe>')
     tab = browser.new_context(offline=True).new_page()
     tab.goto(course.as_uri())
-    tab.wait_for_function("frames.length && true")
-    tab.wait_for_timeout(500)
+    tab.frames[1].wait_for_function("window.lab && lab.firstFrame")
     ask = """(message) => new Promise((answer) => {
         addEventListener("message", ({ data }) => { if (data.id === message.id) answer(data); });
         frames[0].postMessage(message, "*");
