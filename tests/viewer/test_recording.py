@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -25,7 +27,7 @@ from taichi_ants.interventions import Place
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Caste, Food, Labour, Threshold, foraging
-from taichi_ants.viewer import Recorder, Recording, record_colony, record_trace
+from taichi_ants.viewer import Recorder, Recording, page, record_colony, record_trace
 from taichi_ants.viewer.frames import types_of
 
 # Each entry needs its own kernels: learner, sharing, observation, dense, traffic.
@@ -259,3 +261,13 @@ def test_what_cannot_be_recorded_says_why():
     object.__setattr__(trace, "arguments", None)
     with pytest.raises(AntsError, match="does not contain its world and settings"):
         record_trace(trace)
+
+
+def test_notebooks_show_recordings():
+    title = 'An <ant> & its "trail"'
+    trace = rollout(worlds.paper(), trail_follower())
+    recording = record_trace(trace, title)
+    shown = recording._repr_html_()
+    assert shown.startswith("<iframe ")
+    assert html.unescape(re.search(r'title="([^"]*)"', shown)[1]) == title
+    assert html.unescape(re.search(r'srcdoc="([^"]*)"', shown)[1]) == page(recording)
