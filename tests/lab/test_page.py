@@ -101,12 +101,11 @@ class Lab(Page):
             [x, y, side],
         )
 
-    def drag(self, begin, end, steps=8):
+    def drag(self, begin, end):
         (ax, ay), (bx, by) = self.point(*begin), self.point(*end)
         self.tab.mouse.move(ax, ay)
         self.tab.mouse.down()
-        for k in range(1, steps + 1):
-            self.tab.mouse.move(ax + (bx - ax) * k / steps, ay + (by - ay) * k / steps)
+        self.tab.mouse.move(bx, by, steps=8)
         self.tab.mouse.up()
 
     def link(self):

@@ -23,10 +23,6 @@ def straight(codes, random):
     return 1 if codes[1] != 1 and random < 0.9 else random * 5 // 1
 
 
-def learning(learner: str, epsilon: float = 0.0) -> TrainingConfig:
-    return TrainingConfig(learner, 0.1, 0.9, epsilon, 1.0, min_epsilon=0.0)
-
-
 # By name: the task, the learner (None: no table), the sharing, and the policy.
 COLONIES = {
     "Q-learning": (Task(life=LASTING), "q_learning", "shared", None),
@@ -54,11 +50,11 @@ def _registered():
     del RULES.yours["straight"]
 
 
-def begun(name: str, epsilon: float = 0.0) -> Colony:
+def begun(name: str) -> Colony:
     """Return a colony that has learned for a while, in the middle of an episode."""
     task, learner, sharing, policy = COLONIES[name]
     task = task() if callable(task) else task
-    config = None if learner is None else learning(learner, epsilon)
+    config = learner and TrainingConfig(learner, 0.1, 0.9, 0.0, 1.0, min_epsilon=0.0)
     world = worlds.open_world(3, (9, 9, 9))
     colony = Colony(world, task, config, 1, ants=12, sharing=sharing, q_values=policy)
     colony.begin_episode()
@@ -76,11 +72,8 @@ def test_reasons_are_those_of_the_rule(browser, tmp_path, name):
     stories, rule = page.read(STORIES), colony.task.choice.rule
     assert len(stories) == 12 * 60
     whys = {act["why"] for *_, act, _, _ in stories}
-    if rule == "greedy":
-        assert whys <= {"best", "tie", ""}
-        assert whys & {"best", "tie"}
-    else:
-        assert whys == {"rule"}
+    assert whys <= ({"best", "tie", ""} if rule == "greedy" else {"rule"})
+    assert whys & {"best", "tie", "rule"}
     by_values = rule in ("greedy", "softmax")
     for _, _, act, story, bars in stories:
         assert f"Chooses <b>{ACTION_NAMES[act['action']]}</b>" in story
