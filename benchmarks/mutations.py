@@ -42,7 +42,6 @@ GROWING = "tests/commands/test_growing.py"
 RECORDING = "tests/viewer/test_recording.py"
 SERVER = "tests/live/test_server.py"
 SESSION = "tests/live/test_session.py"
-EDITS = "tests/live/test_edits.py"
 SETTINGS = "tests/test_settings.py"
 PROTOCOL = "tests/engines/colony/test_protocol.py"
 MEASURES = "tests/measures"
@@ -249,10 +248,10 @@ MUTATIONS = [
         "engines/colony/interventions.py",
         "(episode << 32) + numbers",
         "(episode << 31) + numbers",
-        EDITS,
+        PROTOCOL,
     ),
     ("engines/colony/interventions.py", 'f"{change.path}_decay": 1.0, ', "", SESSION),
-    ("engines/colony/interventions.py", "numbers < colony.ants ", "numbers < 0 ", EDITS),
+    ("engines/colony/interventions.py", "numbers < colony.ants ", "numbers < 0 ", PROTOCOL),
     # Protocols.
     (
         "engines/colony/timetable.py",
