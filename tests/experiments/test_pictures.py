@@ -18,7 +18,7 @@ from policy_sheet import clarity, policy_sheet, usual_spread
 
 from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
-from taichi_ants.rendering import Episode, save_animation, text
+from taichi_ants.rendering import Episode, text
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import PICK_UP, RIGHT
@@ -81,21 +81,6 @@ def test_a_stage_that_has_ended_stays() -> None:
     assert all((half[ended] == halves[last][ended]).all() for half in halves[last:])
     assert not (halves[last - 1][ended] == halves[last][ended]).all()
     assert not (halves[-1][1 - ended] == halves[last][1 - ended]).all()
-
-
-@pytest.mark.parametrize("size", [(1280, 720), (64, 64)])
-def test_all_stages_fit(size, tmp_path) -> None:
-    checkpoints = Lessons(paper(), CONFIG, 3).checkpoints(0, (0, 1, 2, 3))
-    save_animation(tmp_path / "a.gif", learning_frames(checkpoints, size), 10)
-    with Image.open(tmp_path / "a.gif") as image:
-        assert image.size == size
-        picture = np.asarray(image.convert("RGB")).astype(int)
-    # The columns and the rows of worlds, told by their queens; there is one in the legend too.
-    letters = round(min(size[0] / 60, size[1] / 26))
-    picture = picture[: size[1] - round(2.6 * letters) * (letters >= text.SMALLEST)]
-    purple = (picture[..., 0] - picture[..., 1] > 90) & (picture[..., 2] - picture[..., 1] > 90)
-    groups = [(np.diff(np.flatnonzero(purple.any(axis=axis))) > 8).sum() + 1 for axis in (0, 1)]
-    assert groups == ([4, 1] if size == (1280, 720) else [2, 2])
 
 
 FIVE = observations.get("five_cells")

@@ -206,9 +206,3 @@ def test_text_that_is_none_or_too_long_is_refused(
 def test_a_name_that_no_file_has_is_refused(path: str) -> None:
     with pytest.raises(AntsError, match="cannot read"):
         files.read_text(path)
-
-
-def test_csv_refuses_a_key_that_is_no_column(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="extra"):
-        files.write_csv(tmp_path / "a.csv", [{"a": 1, "extra": 2}], ["a"])
-    assert names(tmp_path) == []
