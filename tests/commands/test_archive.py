@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 from command_lines import ROOT, assert_one_sentence, assert_same_results, call, contents
+from few_resamples import few_resamples  # noqa: F401
+from paper import process
 
 from taichi_ants import commands
 from taichi_ants.commands import reproduce
@@ -257,6 +259,7 @@ def test_studies_with_pages_and_figures_repeat_themselves(
     name, arguments, tmp_path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(process, "available_threads", lambda: 1)  # so with few resamples, too
     assert call(name, [*arguments, "--out", "done"], capsys)[0] == 0
     assert call("archive", ["done"], capsys)[0] == 0
     status, out, _ = call("reproduce", ["done.zip", "--trust-code"], capsys)

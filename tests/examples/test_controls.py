@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ant_system import Search, search
+from ant_system import Search
 from command_lines import EXPERIMENTS, run
 from matplotlib.figure import Figure
 from utility import Foraging
 
 from taichi_ants import World
 from taichi_ants.learners import registry as learners
-from taichi_ants.task import Caste, Threshold
 from taichi_ants.worlds import double_bridge, paper
 
 # The centre of a world and the six cells around it, in order.
@@ -201,31 +200,6 @@ def test_shares_of_foragers_by_hand(script):
     assert rows == [(50, 1 / 3), (100, 2 / 3), (150, 2 / 3), (200, 1 / 3)]
 
 
-@pytest.mark.slow
-def test_the_share_of_foragers_is_demand_by_relief_whatever_the_thresholds(script):
-    """The closed form of Bonabeau et al. (1996): of thresholds of ratio 8, a third is active."""
-    # Three ants, each in the only cell between the queen and a food, deliver equally often.
-    grid = World((3, 3, 3), CENTRE).grid
-    cells = {tuple(cell) for cell in grid.cells(np.flatnonzero(grid.exists)).tolist()}
-    foods = [(2, 0, 0), (0, 2, 0), (0, 0, 2)]
-    rock = sorted(cells - {CENTRE, *RING[::2], *foods})
-    corridors = World((3, 3, 3), CENTRE, foods=foods, obstacles=rock)
-    worlds = SimpleNamespace(open_world=lambda seed, ranges: corridors)
-    found = script("models/division_of_labour", worlds=worlds, ANTS=3, TICKS=10_000, STEP=1)
-    found["WORKERS"] = {
-        "major": Caste(share=1 / 3, threshold=Threshold("fixed", value=80)),
-        "minor": Caste(share=2 / 3, threshold=Threshold("fixed", value=10)),
-    }
-    forages, _, deliveries = found["foraging_over_time"](range(4), 100.0)
-    rate = deliveries.sum() / forages.sum()  # of a forager, per tick
-    demand = rate  # a third of what three foragers would deliver
-    forages, thresholds, _ = found["foraging_over_time"](range(4), demand)
-    assert np.allclose(forages[:, 1000:].mean(axis=(1, 2)), 1 / 3, atol=0.005)
-    majors = np.where(thresholds == 80, forages.mean(axis=1), np.nan)
-    minors = np.where(thresholds == 10, forages.mean(axis=1), np.nan)
-    assert (np.nanmean(minors, axis=1) > 3 * np.nanmean(majors, axis=1)).all()
-
-
 # experiments/goss.py
 
 
@@ -265,32 +239,6 @@ def test_the_row_of_ant_system_by_hand(script):
     assert row == ["4", "2/3", "2", "8.5", "4.5"]  # found in the iterations 2 and 1
     found["search"] = lambda *given, **settings: Search(3, best, mean, 0 * best)
     assert found["row"](settings, WAYS, "max_min") == ["3", "0/3", "-", "8.5", "4.5"]
-
-
-@pytest.mark.parametrize(
-    ("method", "rho", "again"),
-    [
-        # A lone ant starts with tau = 1 / L, for its tour L. Then the arcs of that tour have
-        # (1 - rho) / L + 1 / L, and the others (1 - rho) / L, so L does not matter.
-        ("ant_system", 0.5, (1.5 / 2, 1.5 / 2)),
-        ("ant_system", 0.1, (1.9 / 2.8, 1.9 / 2.8)),
-        ("ant_system", 1.0, (1, 1)),
-        # Tau starts at its upper bound, which the deposit restores. On the other arcs it falls to
-        # 1 - rho of it, but not below 1 / 0.05^(1/L) - 1 of it: 0.8206 for L = 5, 0.5341 for 7.
-        ("max_min", 0.02, (1 / 1.98, 1 / 1.98)),
-        ("max_min", 0.4, (1 / 1.8206, 1 / 1.6)),
-        ("max_min", 1.0, (1 / 1.8206, 1 / 1.5341)),
-    ],
-)
-def test_how_often_a_lone_ant_takes_the_same_way_again(method, rho, again):
-    n = 20_000
-    settings = {"ants": 1, "colonies": n, "evaporation": rho}
-    first, second = search(WAYS, method, iterations=2, **settings).best.T
-    assert set(first) == {5, 7}
-    assert abs((first == 5).mean() - 0.5) < 4 * np.sqrt(0.25 / n)
-    for length, share in zip((5, 7), again, strict=True):
-        same = (second == first)[first == length].mean()
-        assert abs(same - share) <= 4 * np.sqrt(share * (1 - share) / (n / 2))
 
 
 # experiments/fixed_rules.py
