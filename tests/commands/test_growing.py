@@ -46,19 +46,9 @@ ants = 4
 episodes = 2
 ticks = 60
 rollouts = 2
-[world]
-preset = "open"
-ranges = [12, 12, 12]
-per_seed = true
-[task]
-evaporation_in_training = true
-life.regrowth = 0
-[training]
-learner = "sarsa"
-learning_rate = 0.1
-discount = 0.9
-epsilon = 0.3
-epsilon_decay = 0.9
+training = {learner = "sarsa", learning_rate = 1, discount = 0.9, epsilon = 0.3, epsilon_decay = 1}
+world = {preset = "open", ranges = [12, 12, 12], per_seed = true}
+task = {evaporation_in_training = true, life.regrowth = 0}
 [vary]
 task.rewards.shaping = [1, 0]
 """
