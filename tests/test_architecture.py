@@ -1,7 +1,5 @@
 """The shape of the house: who imports whom, who starts Taichi, and how long files are."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from functools import cache

@@ -1,7 +1,5 @@
 """Starting Taichi: when, with what, beside somebody else's, and where it keeps kernels."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What an ant does instead of delivering: constructed policies, exact cases, and the borders."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures as markup: what is drawn is what the figure shows, in the colours of the page."""
 
-from __future__ import annotations
-
 import re
 from xml.etree import ElementTree
 

@@ -1,7 +1,5 @@
 """Intervals over seeds: known values, coverage, and what they must not depend on."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

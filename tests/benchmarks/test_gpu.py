@@ -1,7 +1,5 @@
 """The benchmark of a GPU, without one."""
 
-from __future__ import annotations
-
 import ctypes
 from concurrent.futures import ThreadPoolExecutor
 

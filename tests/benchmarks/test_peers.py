@@ -1,7 +1,5 @@
 """Peers train in the paper's world as we do, and the soak finds faults put into a colony."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import soak

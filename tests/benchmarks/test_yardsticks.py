@@ -1,7 +1,5 @@
 """The yardsticks in C of training and of colonies: more writings of the rules, equal to the bit."""
 
-from __future__ import annotations
-
 import colony_in_c
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Archives of studies and their reproduction, with good and with bad archives."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import zipfile

@@ -1,7 +1,5 @@
 """Studies that grow, shards, and damage: the bytes of one plain run, by any way."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The command line of `taichi-ants render`, from outside."""
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess

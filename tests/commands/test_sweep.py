@@ -1,7 +1,5 @@
 """Sweeps as a command: its tables held against the library, and files that are wrong."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Sweeps with registered measures, series over time, and policies without learning."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

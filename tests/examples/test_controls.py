@@ -1,7 +1,5 @@
 """The scripts in experiments: their own computations, with inputs and results made by hand."""
 
-from __future__ import annotations
-
 import inspect
 import runpy
 from types import SimpleNamespace
@@ -50,7 +48,7 @@ class Given:
     def __init__(self, *arguments: Any, **settings: Any) -> None:
         self.q_values = None
 
-    def run(self, episodes: int, ticks: int) -> Given:
+    def run(self, episodes: int, ticks: int):
         return self
 
 

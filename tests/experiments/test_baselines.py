@@ -1,7 +1,5 @@
 """The published models of ants: equal to plain Python, and to what was published."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import ant_system

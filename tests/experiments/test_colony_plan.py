@@ -1,7 +1,5 @@
 """The plan of the study of colonies, and its files; golden hashes hold its numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from colony import COMPARED, LEARNING, TASKS, conditions_of, greedy, plan, scheduled, with_bounds

@@ -1,7 +1,5 @@
 """The paper's comparison as a command: its files, held against the library."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The paper's table 2 beside ours, and the best of several configurations."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

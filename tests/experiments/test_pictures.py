@@ -1,7 +1,5 @@
 """Pictures of learning, and policy sheets."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from pathlib import Path

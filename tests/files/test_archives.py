@@ -1,7 +1,5 @@
 """Writing and reading archives of arrays."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Damaged files of every format: a sentence, or what was written; never anything else."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource

@@ -1,7 +1,5 @@
 """Registered measures: names, parts, arguments, and messages for wrong ones."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

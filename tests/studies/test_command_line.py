@@ -1,7 +1,5 @@
 """What the command lines share: arguments, exits, plugins, progress."""
 
-from __future__ import annotations
-
 import signal
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Designs: the points that they draw, wrong files, and indices of functions that are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import SALib.analyze.sobol

@@ -1,7 +1,5 @@
 """Studies: wanted minus present, in blocks of any size, by stages, in shards."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import fields, make_dataclass, replace
 

@@ -1,7 +1,5 @@
 """Small session files that would need much time or memory if their size were not checked."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Playback of recordings in Python: the world at each moment, computed from the frames."""
 
-from __future__ import annotations
-
 import json
 import zlib
 from collections.abc import Iterator, Mapping

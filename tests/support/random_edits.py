@@ -1,7 +1,5 @@
 """Random edits, and their application to the plain reference."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Comparison of what steps and resets of environments return."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 Each configuration has explicit numbers. By default all claims of the paper are clearly true.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -58,6 +56,13 @@ class Truth:
     greedy_steps: int = 35
     greedy_deliveries: int = 1
     greedy_varies: bool = False
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Made(Comparison):
+    """A comparison with its episodes."""
+
+    arrays: dict[str, np.ndarray]
 
 
 Edit = Callable[[Variant, GridPoint, Truth], Truth]
@@ -167,13 +172,6 @@ def remeasured(made: Made) -> Made:
     edges = spans(made.episodes)[:-1]
     each = {sums(n): np.add.reduceat(made.arrays[n], edges, axis=2, dtype=int) for n in EPISODES}
     return replace(made, curves=curves_of(made, each))
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Made(Comparison):
-    """A comparison with its episodes."""
-
-    arrays: dict[str, np.ndarray]
 
 
 def _runs(
