@@ -52,9 +52,6 @@ class Given:
         return self
 
 
-# experiments/models/home_trail.py
-
-
 def test_home_trail_averages_the_last_five_episodes(script):
     found = script("models/home_trail", Colony=Given, EPISODES=6)
     Given.deliveries = np.array([[100, 7], [1, 2], [2, 2], [3, 2], [4, 2], [5, 2]])
@@ -64,9 +61,6 @@ def test_home_trail_averages_the_last_five_episodes(script):
     assert rows[:2] == [("compass", 3, 0, 100), ("compass", 3, 1, 1)]
     assert rows[6] == ("compass", 9, 0, 7)
     assert len(rows) == 3 * 2 * 6
-
-
-# experiments/models/two_nests.py
 
 
 def test_shares_of_two_nests_by_hand(script):
@@ -87,9 +81,6 @@ def test_shares_of_two_nests_by_hand(script):
     assert (x, y) == (40, 1.25 / 3)
 
 
-# experiments/models/recovery.py
-
-
 def test_times_to_recover_by_hand(script):
     found = script("models/recovery", SHARES=(0.0, 0.5), REMOVAL=100, TICKS=300)
     given = {
@@ -102,9 +93,6 @@ def test_times_to_recover_by_hand(script):
     expected = [(0.0, 0), (0.0, 0), (0.0, 0), (0.5, 0), (0.5, 200), (0.5, 150)]
     assert table(results[1], "share removed", "ticks to recover") == expected
     assert results[0][-1] == {"removed": 0.5, "seed": 2, "tick": 250, "ants": 95}
-
-
-# experiments/models/misreading.py
 
 
 @pytest.mark.parametrize(
@@ -130,9 +118,6 @@ def test_ants_that_misread_all_cells_hardly_deliver(script):
     never, always = (found["deliveries"](found["FORAGING"], rate, [0, 1, 2]) for rate in (0.0, 1.0))
     assert never.min() > 100
     assert always.max() < 0.02 * never.min()
-
-
-# experiments/models/double_bridge.py
 
 
 def test_shares_of_crossings_by_hand(script):
@@ -179,9 +164,6 @@ def test_sides_of_equal_branches_do_not_matter_and_a_closed_branch_does(script):
     assert np.array_equal(closed, [0, 0])
 
 
-# experiments/models/division_of_labour.py
-
-
 def test_shares_of_foragers_by_hand(script):
     found = script("models/division_of_labour", DEMANDS=(0.5,), TICKS=200, ANTS=3)
     # (seeds, times, ants): the ant with the threshold 1 always forages, that with 9 never.
@@ -196,9 +178,6 @@ def test_shares_of_foragers_by_hand(script):
     }
     rows = table(results[0], "tick", "foragers")
     assert rows == [(50, 1 / 3), (100, 2 / 3), (150, 2 / 3), (200, 1 / 3)]
-
-
-# experiments/goss.py
 
 
 def test_the_table_of_goss_by_hand(script, capsys):
@@ -221,8 +200,6 @@ def test_the_table_of_goss_by_hand(script, capsys):
     assert words.endswith("at most 25.0 percentage points.")
 
 
-# experiments/ant_system.py
-
 # A ring around obstacles, with two ways from the queen to food: 5 and 7 steps.
 WAYS = World((3, 3, 3), (2, 0, 0), foods=[(0, 2, 1)], obstacles=[CENTRE, *RING])
 
@@ -237,9 +214,6 @@ def test_the_row_of_ant_system_by_hand(script):
     assert row == ["4", "2/3", "2", "8.5", "4.5"]  # found in the iterations 2 and 1
     found["search"] = lambda *given, **settings: Search(3, best, mean, 0 * best)
     assert found["row"](settings, WAYS, "max_min") == ["3", "0/3", "-", "8.5", "4.5"]
-
-
-# experiments/fixed_rules.py
 
 
 def test_the_rules_and_rows_of_fixed_rules_by_hand(script):
@@ -290,9 +264,6 @@ def test_ants_with_fixed_rules_deliver_unless_they_explore(script):
     assert random.max() < 0.5 * fixed.min()
 
 
-# experiments/utility.py
-
-
 def test_the_row_of_utilities_by_hand(script):
     found = script("utility")
     first = Foraging(
@@ -308,9 +279,6 @@ def test_the_row_of_utilities_by_hand(script):
     assert found["row"]([first, second]) == expected
 
 
-# experiments/plugins/hysteretic.py
-
-
 @pytest.mark.parametrize(
     ("value", "reward", "largest", "error"),
     [(1, 2, 4, 3), (5, 0, 4, -0.6), (2, 0, 4, 0), (0, -1, 0, -0.2), (-3, -1, 0, 2)],
@@ -319,9 +287,6 @@ def test_td_errors_of_hysteretic_q_learning_by_hand(script, value, reward, large
     td_error = script("plugins/hysteretic")["td_error"]
     next_values = np.array([-9.0, largest, -9.0, -9.0, -9.0])
     assert td_error(value, reward, 0.5, next_values, 0, 0.3) == pytest.approx(error)
-
-
-# experiments/offline.py
 
 
 @pytest.mark.long

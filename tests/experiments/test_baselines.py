@@ -33,9 +33,6 @@ WORLDS = {
 }
 
 
-# The double bridge of Goss and others.
-
-
 @pytest.mark.parametrize(
     ("short", "long", "settings"),
     [
@@ -74,9 +71,6 @@ def test_classes_by_hand() -> None:
     assert class_shares(took, 1, 10).tolist() == [100, 0, 0, 0, 0]
 
 
-# Ant colony optimisation.
-
-
 @pytest.mark.parametrize("settings", [{}, {"alpha": 2}, {"max_steps": 12}], ids=str)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", WORLDS)
@@ -99,9 +93,6 @@ def test_all_colonies_find_the_shorter_branch() -> None:
     assert (result.found > 0).all()
     assert (result.best[:, -20:] < result.shortest + 5).all()
     assert result.mean[:, -1].mean() < 0.8 * result.mean[:, 0].mean()
-
-
-# Ants that back up utilities.
 
 
 @pytest.mark.parametrize(
@@ -142,9 +133,6 @@ def test_all_colonies_find_a_shortest_way() -> None:
     assert result.shortest == 2 * (6 + 10 + 3)
     assert (result.found > 0).all()
     assert (result.deliveries[:, 500:].sum(axis=1) > 60).all()
-
-
-# All three.
 
 
 def results(model: str, colonies: int = 6, **how: int) -> list[np.ndarray]:

@@ -178,9 +178,6 @@ def test_the_sheet_of_an_observation_of_more_cells(lines) -> None:
         policy_sheet(random_policy(), task=Task(observation="five_cells"))
 
 
-# The command lines.
-
-
 @pytest.mark.slow
 def test_learning_and_a_sheet_from_the_command_line(tmp_path: Path, capsys) -> None:
     place = tmp_path / "a.gif"

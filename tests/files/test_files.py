@@ -18,9 +18,6 @@ def names(folder: Path) -> list[str]:
     return sorted(entry.name for entry in folder.iterdir())
 
 
-# write_atomically.
-
-
 def test_a_file_is_written_and_replaced(tmp_path: Path) -> None:
     path = tmp_path / "new" / "folder" / "a.bin"
     for content in (b"one", b"two, longer"):
@@ -82,9 +79,6 @@ def test_a_new_file_has_the_permissions_of_any_new_file(tmp_path: Path) -> None:
     assert modes[0] == modes[1]
 
 
-# check_writable_file.
-
-
 @pytest.mark.parametrize("name", ["old", "new", "new/folder/file", "link", "loop"])
 def test_a_file_that_can_be_written_is_let_be(tmp_path: Path, name: str) -> None:
     (tmp_path / "old").write_text("old")
@@ -133,9 +127,6 @@ def test_a_disk_that_is_full_is_told_before_the_work(tmp_path, monkeypatch) -> N
         files.check_writable_file(tmp_path / "new")
 
 
-# Text, JSON and CSV.
-
-
 def test_text_is_utf_8_with_its_own_line_ends(tmp_path: Path) -> None:
     files.write_text(tmp_path / "a.txt", "é\nb\r\n")
     assert (tmp_path / "a.txt").read_bytes() == b"\xc3\xa9\nb\r\n"
@@ -173,9 +164,6 @@ def test_csv_reads_back(tmp_path: Path) -> None:
         read = list(csv.DictReader(file))
     assert [row["a"] for row in read] == ['with, comma and "quotes"\nand a line', "", "", ""]
     assert [float(row["b"]) for row in read] == [0.1 + 0.2, 1e-300, float(np.float32(0.1)), 2]
-
-
-# Reading.
 
 
 def test_text_is_read_with_any_line_ends(tmp_path: Path) -> None:
