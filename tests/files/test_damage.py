@@ -33,17 +33,11 @@ training.discount = [0.8, 0.9]
 
 
 class SmallFile(NamedTuple):
-    """A file, and a function that returns its content in a comparable form.
-
-    Attributes:
-        path: The file.
-        read: Returns the content of `path`.
-        checked: Whether the reader detects every change of the file.
-    """
+    """A file, and a function that returns its content in a comparable form."""
 
     path: Path
     read: Callable[[Path], Any]
-    checked: bool = True
+    checked: bool = True  # whether the reader detects every change of the file
 
     def outcome(self) -> Any:
         """Return the content of the file or the error, which must be a single short line."""
