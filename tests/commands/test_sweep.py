@@ -160,29 +160,6 @@ def test_what_is_asked_for_twice_is_done_once_and_shown_twice(sweep):
     assert rows[0]["return_last50"] != rows[3]["return_last50"]
 
 
-def test_findings_compare_with_the_value_against_which_all_are_held(sweep):
-    against = "margin = 1000\nagainst.training.epsilon = 0.5\n[task]"
-    status, out, _ = sweep(RUNS.replace("[task]", against), "--no-figures")
-    assert status == 0
-    assert "return_last50 against epsilon 0.5" in out
-    names = ["training.learning_rate", "training.epsilon", "task.rewards.shaping"]
-    rows = read_csv("results/sweep-my/runs.csv")
-
-    def mean(*values):
-        alike = [row for row in rows if tuple(float(row[name]) for name in names) == values]
-        return np.mean([float(row["return_last50"]) for row in alike])
-
-    found = read_csv("results/sweep-my/findings.csv")
-    assert len(found) == 2 * 2 * 2  # two rates, two other epsilons, two shapings
-    for line in found:
-        rate, epsilon, shaping = (float(line[name]) for name in names)
-        assert epsilon != 0.5
-        expected = mean(rate, epsilon, shaping) - mean(rate, 0.5, shaping)
-        assert float(line["difference"]) == pytest.approx(expected)
-        assert float(line["low"]) <= expected + 1e-9 <= float(line["high"]) + 2e-9
-        assert line["finding"] == "equal"  # all within the margin
-
-
 def test_a_sweep_begins_with_a_preset_of_the_task():
     file = {"kind": "runs", "measures": ["greedy_return"], "episodes": 0, "policy": "random"}
     changes = {"rewards": {"deliver": 70}}

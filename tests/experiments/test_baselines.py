@@ -87,14 +87,6 @@ def test_every_tour_is_as_long_as_the_references(name: str, method: str, setting
             assert np.array_equal(result.mean[colony, i], mean, equal_nan=True)
 
 
-def test_all_colonies_find_the_shorter_branch() -> None:
-    result = search(double_bridge(10, 15, mirrored=True), iterations=200, colonies=8)
-    assert result.shortest == 6 + 10 + 3  # to the junction, over the bridge, to the pile
-    assert (result.found > 0).all()
-    assert (result.best[:, -20:] < result.shortest + 5).all()
-    assert result.mean[:, -1].mean() < 0.8 * result.mean[:, 0].mean()
-
-
 @pytest.mark.parametrize(
     "settings",
     [
@@ -126,13 +118,6 @@ def test_every_utility_delivery_and_path_equals_the_reference(name: str, setting
             for cell, level in colony.utilities[goal].items():
                 levels[grid.index(cell)] = level
             assert np.array_equal(result.utilities[number, row], levels)
-
-
-def test_all_colonies_find_a_shortest_way() -> None:
-    result = forage(double_bridge(10, 15))
-    assert result.shortest == 2 * (6 + 10 + 3)
-    assert (result.found > 0).all()
-    assert (result.deliveries[:, 500:].sum(axis=1) > 60).all()
 
 
 def results(model: str, colonies: int = 6, **how: int) -> list[np.ndarray]:
