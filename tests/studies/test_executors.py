@@ -1,7 +1,5 @@
 """Blocks by executors of all kinds: the same results, whatever happens to the workers."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import re

@@ -1,7 +1,5 @@
 """Pages of synthetic studies, for tests of their text and in a browser."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 
@@ -36,7 +34,7 @@ class Results(NamedTuple):
     audit: Audit
 
     @classmethod
-    def of(cls, comparison: Comparison) -> Results:
+    def of(cls, comparison: Comparison):
         """Return the results of a comparison."""
         return cls(comparison, table2(comparison, summarise(comparison)), assess(comparison))
 

@@ -1,7 +1,5 @@
 """Actions of tests of environments, and comparison of what steps and resets return."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
