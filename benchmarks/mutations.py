@@ -42,7 +42,6 @@ GROWING = "tests/commands/test_growing.py"
 RECORDING = "tests/viewer/test_recording.py"
 SERVER = "tests/live/test_server.py"
 SESSION = "tests/live/test_session.py"
-EDITS = "tests/live/test_edits.py"
 SETTINGS = "tests/test_settings.py"
 PROTOCOL = "tests/engines/colony/test_protocol.py"
 MEASURES = "tests/measures"
@@ -69,8 +68,8 @@ MUTATIONS = [
     ("features/labour.py", "lowered > 0.0, lowered", "True, lowered", COLONY),
     (
         "engines/colony/learning.py",
-        "does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0",
-        "does = True",
+        "columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0 if",
+        "True if",
         COLONY,
     ),
     ("engines/colony/steps.py", ">> number & 1 == 1", ">> 0 & 1 == 1", COLONY),
@@ -86,7 +85,7 @@ MUTATIONS = [
     ),
     ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
     ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
-    ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
+    ("engines/colony/steps.py", "(field.half, carries", "(True, carries", COLONY),
     ("task/model.py", "task.choice.carriers_follow or ", "", CHOICE),
     ("measures/tidy.py", "column.startswith(f", "column == (f", RESULTS_OF_RUNS),
     ("rendering/rasteriser.py", "ANTS[snapshot.ant_nests]", "ANTS[0 * snapshot.ant_nests]", RASTER),
@@ -146,8 +145,8 @@ MUTATIONS = [
     ),
     (
         "task/rules/policy.py",
-        "(1.0 - explores) / ti.cast(ties",
-        "1.0 / ti.cast(ties",
+        "(1.0 - explores) / ti.cast(popcnt(best)",
+        "1.0 / ti.cast(popcnt(best)",
         "tests/offline/test_recording.py",
     ),
     ("task/rules/policy.py", "cumulative <= drawn", "cumulative < drawn / 2", CHOICE),
@@ -249,10 +248,10 @@ MUTATIONS = [
         "engines/colony/interventions.py",
         "(episode << 32) + numbers",
         "(episode << 31) + numbers",
-        EDITS,
+        PROTOCOL,
     ),
     ("engines/colony/interventions.py", 'f"{change.path}_decay": 1.0, ', "", SESSION),
-    ("engines/colony/interventions.py", "numbers < colony.ants ", "numbers < 0 ", EDITS),
+    ("engines/colony/interventions.py", "numbers < colony.ants ", "numbers < 0 ", PROTOCOL),
     # Protocols.
     (
         "engines/colony/timetable.py",

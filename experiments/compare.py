@@ -15,6 +15,9 @@ from taichi_ants.studies.interruption import stoppable
 
 with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
+    import gc
+
+    gc.set_threshold(300_000)  # with Python's default, collections take a tenth of the time
     from collections.abc import Callable, Mapping, Sequence
     from dataclasses import dataclass, fields, replace
     from functools import partial
@@ -141,6 +144,7 @@ def plan(options: Mapping[str, Any]) -> Plan:
     study = Study(tuple(points), seeds, arrays, measured)
     discounts = tuple(dict.fromkeys(options["discounts"]))
     exact = process.begin(bounds.bound_rows, world, points[0].task, discounts, points[0].max_steps)
+    process.begin(page.get_ready, world, points[0].task)
     return Plan(study, name, exact)
 
 
@@ -231,10 +235,11 @@ def tables(plan: Plan, results: Results) -> str:
     comparison = replace(comparison, curves=figures.curves_of(comparison, arrays))
     follow, runs = partial(evaluate, arch=arch), (study.seeds, first.rollouts, first.max_steps)
     baselines = plan.exact() + bounds.policy_rows(first.world, first.task, follow, *runs)
+    saved = process.begin(figures.save_all, comparison, baselines, folder / "figures")
     chosen = [trained(study, row, run, arch) for row, run in examples(comparison)]
     seen: Callable[[], Seen] = Seen
     if results.figures:
-        seen = page.begin(comparison, baselines, chosen, folder)
+        seen = page.begin(comparison, baselines, chosen, saved)
 
     summaries = summarise(comparison)
     lines, audit = table2(comparison, summaries), assess(comparison)

@@ -33,10 +33,9 @@ PAGES = {
 BINARIES = ("colony.wasm", "ant.wasm")
 MOST_BYTES = 400_000  # that a visitor should wait for
 FONTS = LAB / "page" / "fonts"
-FACES = (("Newsreader", "500", "newsreader.woff2"), ("Inter", "400 650", "inter.woff2"))
 _IMPORT = re.compile(r"^import\b[^;]*;\n", re.M)
 _MODULE = re.compile(r'^import\b[^;]* from "([^"]+\.js)";$', re.M)
-_DATA = re.compile(r'^import (\w+) from "([^"]+)" with { type: "json" };$', re.M)
+_DATA = re.compile(r'^(import (\w+) from "([^"]+)" with { type: "json" };)$', re.M)
 # Names at the start of a line, also several in a row: const A = 1, B = 2;
 _NAMES = re.compile(r"^(?:async )?(?:const|let|function|class) ((?:\w+ = [^,(\[{\n]+, )*\w+)", re.M)
 
@@ -44,12 +43,6 @@ _NAMES = re.compile(r"^(?:async )?(?:const|let|function|class) ((?:\w+ = [^,(\[{
 def base64_of(path: Path) -> str:
     """Return the content of a file in base64."""
     return base64.b64encode(path.read_bytes()).decode()
-
-
-def with_data(path: Path) -> str:
-    """Return a module in which imported JSON is a constant."""
-    data = lambda found: f"const {found[1]} = {(path.parent / found[2]).read_text('utf-8')};"  # noqa: E731
-    return _DATA.sub(data, path.read_text("utf-8"))
 
 
 def modules_of(path: Path) -> list[Path]:
@@ -61,7 +54,13 @@ def modules_of(path: Path) -> list[Path]:
 
 def script(name: str) -> str:
     """Return a module with all that it imports; ValueError if two of them declare the same name."""
-    parts = [_IMPORT.sub("", with_data(path)) for path in modules_of(LAB / name)]
+    parts = []
+    for path in modules_of(LAB / name):
+        text = path.read_text("utf-8")
+        for line, constant, data in _DATA.findall(text):
+            content = (path.parent / data).read_text("utf-8")
+            text = text.replace(line, f"const {constant} = {content};")
+        parts.append(_IMPORT.sub("", text))
     text = re.sub(r"^export ", "", "\n".join(parts), flags=re.M)
     names = [re.sub(" = .*", "", one) for row in _NAMES.findall(text) for one in row.split(", ")]
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -73,19 +72,16 @@ def script(name: str) -> str:
 def page(name: str) -> str:
     """Return a whole page; raise ValueError if it is larger than a visitor should wait for."""
     markup, styles, module = PAGES[name]
-    faces = "".join(
-        f'@font-face {{ font-family: "{family}"; font-weight: {weight}; font-display: swap; '
-        f'src: url(data:font/woff2;base64,{base64_of(FONTS / file)}) format("woff2"); }}\n'
-        for family, weight, file in FACES
-    )
+    style = "\n".join((LAB / one).read_text("utf-8") for one in ("page/base.css", *styles))
+    for font in FONTS.glob("*.woff2"):
+        style = style.replace(f"url({font.name})", f"url(data:font/woff2;base64,{base64_of(font)})")
     code = script(module)
     found = {one: base64_of(LAB / "engine" / one) for one in BINARIES if f'"{one}"' in code}
     head, body = (LAB / markup).read_text("utf-8").split("<body>\n")
     parts = {
         "HEAD": head,
         "BODY": body,
-        "STYLE": faces
-        + "\n".join((LAB / style).read_text("utf-8") for style in ("page/base.css", *styles)),
+        "STYLE": style,
         "SCRIPT": f"const BINARIES = {json.dumps(found)};\n{code}",
     }
     if name == "lessons.html":

@@ -205,13 +205,6 @@ def quiet() -> Iterator[None]:
 
 
 @cache
-def _source_file(function: Any) -> str:
-    from taichi.lang._wrap_inspect import getsourcefile
-
-    return getsourcefile(function)
-
-
-@cache
 def _source_lines(function: Any) -> tuple[list[str], int]:
     from taichi.lang._wrap_inspect import getsourcelines
 
@@ -237,7 +230,6 @@ def _transform(tree: Any, context: Any) -> Any:
 # Functions with which Taichi reads source, but once for each.
 _READS = {
     "ast": SimpleNamespace(parse=_parse),
-    "getsourcefile": _source_file,
     "getsourcelines": _source_lines,
     "textwrap": SimpleNamespace(fill=cache(textwrap.fill), dedent=cache(textwrap.dedent)),
     "transform_tree": _transform,

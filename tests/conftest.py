@@ -1,7 +1,5 @@
 """Shared setup of all tests: compiled kernels, and hypothesis without time limits."""
 
-from __future__ import annotations
-
 import gc
 import os
 import sys

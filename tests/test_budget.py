@@ -1,7 +1,5 @@
 """No folder has more lines than its budget; run as a script, this writes the present numbers."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Features: what a task or a world uses is refused wherever it is not supported, also if new."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Arguments of a wrong kind are told where they are given; no message fills a screen."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

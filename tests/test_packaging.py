@@ -1,7 +1,5 @@
 """The wheel, the source distribution, and the command that they install."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Names of learners, observations, worlds, measures and rules: listed, looked up, and refused."""
 
-from __future__ import annotations
-
 import pytest
 
 from taichi_ants import AntsError, learners, measures, rules, worlds

@@ -1,7 +1,5 @@
 """Settings as they are declared: what is taken, what is refused, and in which words."""
 
-from __future__ import annotations
-
 import math
 import pickle
 import re

@@ -1,7 +1,5 @@
 """The project's words, as far as a machine judges them: spelling, and what must not be named."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,16 +17,21 @@ from paper.baselines import Baseline
 from paper.claims import Audit, headlines
 from paper.comparison import DEFINITIONS, Comparison, counts
 from paper.table2 import Line, summarise_behaviours
+from taichi_ants.analysis import style
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
+from taichi_ants.engines.runs.results import RolloutArguments, Trace
+from taichi_ants.engines.runs.training import rollout
 from taichi_ants.errors import count
-from taichi_ants.rendering import Episode
+from taichi_ants.rendering.snapshots import colony_of_rollout
 from taichi_ants.report.page import Picture, Player, ShownFinding, Statement, Statements, fill
 from taichi_ants.studies.command_line import progress_bar
 from taichi_ants.studies.points import RunPoint
 from taichi_ants.task import Task
-from taichi_ants.viewer import record_trace
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.viewer import record_colony, record_trace
+from taichi_ants.worlds.world import World
 
 STEPS = 80  # the longest recording; a delivery takes 34 steps, walking to and fro on the trail 38
 
@@ -39,15 +45,13 @@ class Example(NamedTuple):
     seed: int
     q_values: np.ndarray
 
-    def played(self) -> Episode:
+    def played(self) -> Trace:
         """Return the first steps of the episode by which its behaviour was classified.
 
         It has the evaporation of training, not that of the greedy evaluation.
         """
         steps, task = min(self.point.max_steps, STEPS), as_in_training(self.point.task)
-        return Episode.play(
-            self.point.world, self.q_values, seed=self.seed, max_steps=steps, task=task
-        )
+        return rollout(self.point.world, self.q_values, self.seed, 0, steps, task)
 
 
 class Seen(NamedTuple):
@@ -63,25 +67,33 @@ def as_in_training(task: Task) -> Task:
     return replace(task, evaporation_in_evaluation=task.evaporation_in_training)
 
 
+def get_ready(world: World, task: Task) -> None:
+    """Import what draws figures and prepare the kernels of recordings, while others train."""
+    style.new_figure(1)
+    table = np.zeros((task.n_states, N_ACTIONS), np.float32)
+    arguments = RolloutArguments(world, as_in_training(task), 0, 1, 0, table)
+    record_colony(colony_of_rollout(arguments), 1)
+
+
 def begin(
     comparison: Comparison,
     baselines: Sequence[Baseline],
     examples: Sequence[Example],
-    folder: Path,
+    saved: process.Begun,
 ) -> Callable[[], Seen]:
-    """Return a function that waits for all figures and recordings.
+    """Return a function that waits until figures are `saved`, and draws what the page shows.
 
-    This process follows the policies, because it has compiled the kernel. The second process begins
-    with the figures, for which it does not start Taichi; this one begins with the last calls.
+    This process follows the policies, because it has compiled the kernel.
     """
-    played = [example.played() for example in examples]
-    drawn = process.begin(figures.save_all, comparison, baselines, folder / "figures")
-    calls: dict[Any, process.Begun] = {"figures": drawn}
-    first: dict[int, tuple[Example, Episode]] = {}
-    for example, episode in zip(examples, played, strict=True):
-        first.setdefault(int(comparison.behaviours[example.row, example.run]), (example, episode))
-    done, captions = counts(comparison.behaviours), dict[Any, tuple[str, str]]()
-    for code, (example, episode) in sorted(first.items()):
+    first: dict[int, Example] = {}
+    for example in examples:
+        first.setdefault(int(comparison.behaviours[example.row, example.run]), example)
+    calls: dict[Any, process.Begun] = {"saved": saved}
+    for code, example in first.items():
+        calls[code] = process.begin(record_trace, example.played(), BEHAVIOURS[code])
+    calls["figures"] = process.begin(figures.for_page, comparison, baselines)
+    done, captions = counts(comparison.behaviours), dict[int, tuple[str, str]]()
+    for code, example in sorted(first.items()):
         _, variant, grid = comparison.rows[example.row]
         whose = (
             f"{variant.label}, delivery {example.point.task.delivery}, seed {example.seed}, "
@@ -90,20 +102,21 @@ def begin(
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Shown: {whose}."
         captions[code] = sentence(BEHAVIOURS[code]), words
-        calls[code] = process.begin(record_trace, episode.trace, BEHAVIOURS[code])
         if code == DELIVERS:
-            title, task = f"{variant.label}: policy", example.point.task
-            captions["sheet"] = "", f"The policy of an ant: {whose}"
-            calls["sheet"] = process.begin(policy_sheet, example.q_values, title, task=task)
+            words, title = f"The policy of an ant: {whose}", f"{variant.label}: policy"
+            calls["sheet"] = partial(_sheet, words, example, title)
 
     def wait() -> Seen:
         with progress_bar("pictures") as progress:
             results = process.results_of(calls, progress)
         players = [Player(*captions[code], results[code]) for code in sorted(first)]
-        sheet = Picture(captions["sheet"][1], results["sheet"]) if "sheet" in results else None
-        return Seen(results["figures"], players, sheet)
+        return Seen(results["figures"], players, results.get("sheet"))
 
     return wait
+
+
+def _sheet(words: str, example: Example, title: str) -> Picture:
+    return Picture.of(words, policy_sheet(example.q_values, title, task=example.point.task))
 
 
 def comparison_page(

@@ -152,24 +152,18 @@ class World {
 /** The worlds of a text, of which those in view run. */
 export class Stage {
   constructor() {
-    const calm = matchMedia("(prefers-reduced-motion: reduce)");
     this.module = new WebAssembly.Module(bytesOf("colony.wasm"));
     this.theme = /theme=light/.test(location.search) ? "light" : "dark";
-    this.ui = { arrows: "", still: calm.matches, now: 0, hero: -1, ghost: null, pointer: null };
+    this.ui = { arrows: "", still: matchMedia("(prefers-reduced-motion: reduce)").matches, now: 0, hero: -1, ghost: null, pointer: null };
     this.sleeping = true;
     this.worlds = [...document.querySelectorAll("[data-piece]")].map((figure) => new World(figure, this));
     this.last = null; // the world that came into view last
-    const toggle = byId("theme");
-    toggle.addEventListener("click", () => this.setTheme(this.theme === "dark" ? "light" : "dark"));
+    byId("theme").addEventListener("click", () => this.setTheme(this.theme === "dark" ? "light" : "dark"));
     this.setTheme(this.theme);
     const sight = new IntersectionObserver((entries) => entries.forEach(({ target, intersectionRatio }) =>
       this.worlds.find(({ canvas }) => canvas === target).view(intersectionRatio >= IN_VIEW)), { threshold: [0, IN_VIEW] });
-    for (const { canvas } of this.worlds) sight.observe(canvas);
-    let width = innerWidth;
-    addEventListener("resize", () => {
-      if (width !== innerWidth) for (const world of this.worlds) world.fit();
-      width = innerWidth;
-    });
+    const sizes = new ResizeObserver((entries) => entries.forEach(({ target }) => this.worlds.find(({ canvas }) => canvas === target).fit()));
+    for (const { canvas } of this.worlds) [sight, sizes].forEach((observer) => observer.observe(canvas));
     document.fonts.ready.then(() => this.wake());
   }
 

@@ -19,8 +19,6 @@ static int n_notes, most_notes;
 #include "ant.c"
 #include "grid.h"
 
-#define EXPORT __attribute__((visibility("default")))
-
 static World world;
 static Job job;
 static Run *runs;
@@ -70,8 +68,6 @@ EXPORT Note *note_steps(int most)
     n_notes = 0, most_notes = notes ? most : 0;
     return notes;
 }
-
-EXPORT int steps_noted(void) { return n_notes; }
 
 /* Train the runs that are prepared; return the address of their tables, then returns, steps and
  * deliveries; or NULL if out of memory. Each run draws from the stream of its seed, a purpose and a

@@ -12,7 +12,6 @@
  * values of the state. A tick makes three or four passes over the ants, and one over the pairs of
  * state and action that had errors.
  */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -128,14 +127,7 @@ INLINE int goals_in_view(int percept)
 /* Unused places of a row hold minus infinity. */
 INLINE Greedy greedy_of(const float *row)
 {
-#ifdef __AVX2__
-    __m256 values = _mm256_loadu_ps(row);
-    __m128 best = _mm_max_ps(_mm256_castps256_ps128(values), _mm256_extractf128_ps(values, 1));
-    best = _mm_max_ps(best, _mm_movehl_ps(best, best));
-    best = _mm_max_ss(best, _mm_movehdup_ps(best));
-    __m256 equal = _mm256_cmp_ps(values, _mm256_broadcastss_ps(best), _CMP_EQ_OQ);
-    return (Greedy){_mm_cvtss_f32(best), (uint32_t)_mm256_movemask_ps(equal)};
-#elif defined(__wasm_simd128__)
+#ifdef __wasm_simd128__
     v128_t low = wasm_v128_load(row), high = wasm_v128_load(row + 4);
     v128_t best = wasm_f32x4_pmax(low, high); /* of two numbers, `a < b ? b : a` */
     best = wasm_f32x4_pmax(best, wasm_i32x4_shuffle(best, best, 2, 3, 0, 1));
@@ -454,7 +446,7 @@ INLINE int sense_and_learn(const Colony *c, const Work *w, int rules, Ant *ant, 
         pairs[n] = pair;
         n += errors[pair].updates == 0;
         errors[pair].updates++;
-        errors[pair].sum += (int64_t)floor((double)error * 4294967296.0 + 0.5);
+        errors[pair].sum += (int64_t)__builtin_floor((double)error * 4294967296.0 + 0.5);
         errors[pair].latest = error;
     }
     ant->percept = percept;
@@ -579,7 +571,7 @@ static void note_best(const Colony *c, const Work *w)
     for (int state = 0; state < c->states; state++) {
         float *row = c->q + state * ROW;
         for (int a = N_ACTIONS; a < ROW; a++)
-            row[a] = -INFINITY;
+            row[a] = -__builtin_inff();
         w->greedy[state] = greedy_of(row);
     }
 }

@@ -1,6 +1,7 @@
 /* Common parts of all programs: actions, and random numbers (taichi_ants/grid/randomness.py). */
 #include <stdint.h>
 
+#define EXPORT __attribute__((visibility("default")))
 #define INLINE static inline __attribute__((always_inline))
 
 enum { LEFT, FORWARD, RIGHT, PICK_UP, GIVE, N_ACTIONS };

@@ -7,7 +7,6 @@
 #include "colony.c"
 #include "grid.h"
 
-#define EXPORT __attribute__((visibility("default")))
 enum { REACH = 8 }; /* of the search for a cell to which an ant can move aside */
 enum { TICKS_TO_FADE = 20, FARTHEST = 2048 };
 

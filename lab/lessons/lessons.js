@@ -14,8 +14,6 @@ import { STEPS } from "../page/worlds.js";
 const RANGE = 10, FIRST_CELL = [-8, 0];       // of the paper's world: its size, and where ants start
 /** The recorded steps of lone ants: a map, a slider, and what happened in a step. */
 class Walk {
-  place; walks; bar;
-
   constructor(place, walks, at = 0) {
     const hexagon = STEPS.map(([q, r]) => centre(q, r)).map(([x, y]) => `${(y / 1.82).toFixed(2)},${(x / 1.82).toFixed(2)}`).join(" ");
     const cells = [];
@@ -75,8 +73,6 @@ class Walk {
 
 /** The place of an experiment: an editor if there is something to write, a button, and the result. */
 class Place {
-  element; page; experiment; button; result; group = null;
-
   constructor(element, page) {
     this.element = element;
     this.page = page;
@@ -112,17 +108,14 @@ class Place {
 
   /** @param {import("../../docs/lessons/page/experiments.js").Outcome} outcome */
   show({ say, head, rows, lines, across, walks, at, views }) {
-    const { look } = this.page;
     this.result.innerHTML = (say ? `<p>${escaped(say)}</p>` : "") + (rows ? tableOf(head, rows) : "") + (lines ? plotOf(lines, across) : "")
-      + (views ? `<div class="views">${views.map(({ state, values }) => `<div>${glyph([state >> 6, ...viewOf(state)], values, look)}<b>${ACTS[values.indexOf(Math.max(...values))]}</b>${nameOf(state)}</div>`).join("")}</div>` : "");
+      + (views ? `<div class="views">${views.map(({ state, values }) => `<div>${glyph([state >> 6, ...viewOf(state)], values, LOOKS[this.page.theme])}<b>${ACTS[values.indexOf(Math.max(...values))]}</b>${nameOf(state)}</div>`).join("")}</div>` : "");
     if (walks) new Walk(this.result, walks, at);
   }
 }
 
 /** A prediction, and what waits for it: one experiment, and everything after it up to the next section. */
 class Group {
-  field; hidden; teachers;
-
   constructor(label, teachers) {
     this.field = label.querySelector("textarea");
     this.hidden = [];
@@ -170,8 +163,6 @@ class Lessons extends Stage {
     this.turn();
     for (const place of this.places) if (place.experiment.now) place.run();
   }
-
-  get look() { return LOOKS[this.theme]; }
 
   arrange(chapter) {
     const groups = [];

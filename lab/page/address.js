@@ -1,6 +1,7 @@
 /* address.js: the address holds the scene, the seed and every stroke, so that a link replays a visit to the bit. */
 
 import { decode, encode, linkOf, partsOf, pythonOf } from "./link.js";
+import { beginDaily } from "./daily.js";
 import { byId } from "./page.js";
 import { QUESTIONS } from "./scenes.js";
 import { many } from "./story.js";
@@ -11,12 +12,6 @@ const MOST_REPLAY = 200_000; // ticks of a link that are replayed at once
 
 /** The text after "#" that replays the runs up to now; two runs are joined by "~". */
 export const visitOf = (runs) => runs.map((run) => linkOf(run.engine)).join("~");
-
-const withoutMoment = (runs) => runs.map(({ engine }) => encode(engine.first, engine.events)).join("~");
-
-function show(text) {
-  try { history.replaceState(null, "", `#${text}`); } catch { /* a frame that has no address */ }
-}
 
 /** Copy a text; return whether the browser allowed it. Pages in frames and files often need the old way. */
 async function copied(text) {
@@ -47,19 +42,19 @@ export class Address {
     clearTimeout(this.saving);
     this.saving = setTimeout(() => {
       const { runs } = this.lab, prepared = runs.some((run) => run.start > 0); // ticks that nobody wants to watch
-      show(prepared ? visitOf(runs) : withoutMoment(runs));
+      this.show(prepared ? visitOf(runs) : runs.map(({ engine }) => encode(engine.first, engine.events)).join("~"));
     }, SAVE_MS);
   }
 
-  /** Write a name into the address: of a question, or of the daily map. */
-  name(id) {
+  /** Write a text into the address: a link, or the name of a question or of the daily map. */
+  show(text) {
     clearTimeout(this.saving);
-    show(id);
+    try { history.replaceState(null, "", `#${text}`); } catch { /* a frame that has no address */ }
   }
 
   async copy() {
     const text = visitOf(this.lab.runs);
-    show(text);
+    this.show(text);
     const done = await copied(`${location.href.split("#")[0]}#${text}`);
     const { tick } = this.lab.runs[0];
     this.lab.toast(done ? `Link copied: ${many(text.length)} characters. It replays these ${many(tick)} ticks to the same state.`
@@ -75,41 +70,36 @@ export class Address {
     return lines;
   }
 
-  /** Open what the address asks for. Return whether it asked for anything. */
+  /** Open what the address asks for. */
   open(text = location.hash.slice(1)) {
-    const { lab } = this;
-    if (!text) return false;
-    const question = QUESTIONS.find((one) => one.id === text);
-    if (question) return lab.ask(question) || true;
-    if (text === "daily") return lab.daily.begin() || true;
+    const { lab } = this, question = QUESTIONS.find((one) => one.id === text);
+    if (question) lab.ask(question);
+    else if (text === "daily") beginDaily(lab);
+    else if (text) this.replay(text);
+  }
+
+  /** Play links up to their moment, and compare the states. */
+  replay(text) {
+    const { lab } = this, began = performance.now();
     let starts;
     try {
       starts = text.split("~").slice(0, 2).map((one) => {
-        const { code, tick, hash } = partsOf(one), { scene, events } = decode(code);
-        return { scene, events, tick, hash };
+        const { code, tick, hash } = partsOf(one);
+        return { ...decode(code), tick, hash };
       });
     } catch (error) {
       lab.begin();
-      lab.toast(error.name === "URIError" ? DAMAGED : error.message, 6000);
-      return true;
+      return lab.toast(error.name === "URIError" ? DAMAGED : error.message, 6000);
     }
     lab.begin(starts);
-    this.replay(starts);
-    return true;
-  }
-
-  /** Play a link up to its moment, and compare the state. */
-  replay(starts) {
-    const { lab } = this, began = performance.now();
     if (starts.some(({ tick }) => tick === null || tick > MOST_REPLAY)) {
-      if (starts[0].events.length) lab.toast("This link plays what was drawn.", 5000);
-      return;
+      return starts[0].events.length ? lab.toast("This link plays what was drawn.", 5000) : undefined;
     }
     lab.runs.forEach((run, k) => run.skip(starts[k].tick));
     const ms = Math.round(performance.now() - began), wrong = lab.runs.filter((run, k) => starts[k].hash && run.engine.hash() !== starts[k].hash);
     this.replayed = { equal: !wrong.length, ms };
     lab.toast(wrong.length ? `Replayed ${many(starts[0].tick)} ticks, but the state differs: it is ${wrong[0].engine.hash()}.`
       : `Replayed ${many(starts[0].tick)} ticks in ${many(ms)} ms: the same state, to the last bit.`, 6000);
-    lab.controls.show();
+    return lab.controls.show();
   }
 }

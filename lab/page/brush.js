@@ -3,8 +3,7 @@
 import { cellAt, centre, lineTo } from "./geometry.js";
 import { STEPS } from "./worlds.js";
 
-const KEYS = { ArrowUp: 0, ArrowDown: 3 };
-const SIDEWAYS = { ArrowRight: [1, 2], ArrowLeft: [4, 5] }; // in turn, so that the brush keeps its row
+const HEADINGS = { ArrowUp: [0, 0], ArrowDown: [3, 3], ArrowRight: [1, 2], ArrowLeft: [5, 4] }; // in even and odd columns: the brush keeps its row
 const NEAR = 3.5; // of an ant that is picked, in the unit of geometry.js
 
 /**
@@ -18,7 +17,6 @@ export class Brush {
     this.side = side;
     this.end = null; // the last cell of the stroke
     this.fresh = []; // cells that are not applied yet
-    this.even = false;
     const on = (name, act) => side.canvas.addEventListener(name, act);
     on("pointerdown", (event) => this.press(event));
     on("pointermove", (event) => this.move(event));
@@ -80,17 +78,16 @@ export class Brush {
   /** Arrows move the brush, Enter lowers and lifts it. */
   key(event) {
     const { ui } = this.lab, { engine } = this.side.run;
-    const heading = SIDEWAYS[event.key] ? SIDEWAYS[event.key][Number(this.even)] : KEYS[event.key];
-    if (heading === undefined && event.key !== "Enter") return;
+    if (!HEADINGS[event.key] && event.key !== "Enter") return;
     event.preventDefault();
     ui.focused = true;
     ui.pointer ||= [engine.q(engine.queen), engine.r(engine.queen)];
-    if (heading !== undefined) {
-      if (SIDEWAYS[event.key]) this.even = !this.even;
-      const [q, r] = [ui.pointer[0] + STEPS[heading][0], ui.pointer[1] + STEPS[heading][1]];
-      if (engine.exists(q, r)) ui.pointer = [q, r];
+    const [q, r] = ui.pointer;
+    if (HEADINGS[event.key]) {
+      const step = STEPS[HEADINGS[event.key][r & 1]];
+      if (engine.exists(q + step[0], r + step[1])) ui.pointer = [q + step[0], r + step[1]];
       if (ui.down) this.drawTo(ui.pointer);
-    } else if (ui.brush === "look") this.pick(centre(ui.pointer[0], ui.pointer[1]));
+    } else if (ui.brush === "look") this.pick(centre(q, r));
     else if (ui.down) this.lift();
     else this.lower();
   }

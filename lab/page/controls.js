@@ -10,12 +10,11 @@ const BRUSHES = [["rock", "Rock", "Draw rock (R)"], ["food", "Food", "Draw food 
                  ["erase", "Erase", "Erase rock, food and trails (E)"], ["look", "Look", "Look into an ant (L)"]];
 const COUNTS = [1, 2, 4, 8, 12, 16, 24, 32, 40, 48, 64, 80, 100, 128, 160, 200, 250, 300, 350, 400, 450, 500, 600, 700, 800, 1000,
                 1500, 2000, 3000, 5000, 10000];
-const percent = (v) => `${Math.round(v * 100)} %`;
 
 /** Sliders: the values of their steps, the words, what they mean, and whether a change starts the run again. @type {any[]} */
 const SLIDERS = [
   { name: "ants", label: "Ants", steps: COUNTS, words: many },
-  { name: "epsilon", label: "Exploration", steps: Array.from({ length: 51 }, (_, k) => k / 100), words: percent,
+  { name: "epsilon", label: "Exploration", steps: Array.from({ length: 51 }, (_, k) => k / 100), words: (v) => `${Math.round(v * 100)} %`,
     help: "Exploration: how many of their actions are random" },
   { name: "level", label: "Scent lasts", steps: Array.from({ length: 24 }, (_, k) => 50 * k + 50), words: seconds,
     help: "Scent lasts: how long it takes new scent to fade" },
@@ -27,15 +26,12 @@ const SLIDERS = [
   { name: "first", label: "First values", steps: Array.from({ length: 21 }, (_, k) => k), words: String, more: true, restarts: true },
   { name: "regrowth", label: "Food grows back after", steps: [0, 20, 50, 100, 200, 500, 1000], words: (v) => (v ? seconds(v) : "at once"), more: true, restarts: true },
 ];
-const LEARNING_HELP = "Learning: while it is off they go on with what they know and learn nothing more";
-const RULES_HELP = "Rules: what ants see and who gives way and where scent points. A change starts again.";
 const RULE_NAMES = [["paper", "the paper’s"], ["foraging", "foraging"], ["queueing", "foraging and queues"]];
 const PART_NAMES = [["directed", "A: scent rises towards food"], ["rightOfWay", "B: ants with food have right of way"],
                     ["seesAnts", "C: ants see each other"]];
 const PLACES = { meadow: "the meadow", plain: "the plain", steppe: "the steppe", bridge: "two bridges", paper: "the paper’s", daily: "today’s map" };
 const CROWDS = { plain: 1000, steppe: 10000, paper: 16 }; // ants to start with
 const LEARNER_NAMES = [["q_learning", "Q-learning"], ["sarsa", "SARSA"], ["frozen", "none: written by hand"]];
-const SIZES = ["small", "medium", "large", "huge"];
 
 /** The index of the step that is nearest to a value. */
 const stepOf = (steps, value) => steps.reduce((best, step, k) => (Math.abs(step - value) < Math.abs(steps[best] - value) ? k : best), 0);
@@ -62,13 +58,13 @@ export class Controls {
   }
 
   build() {
-    const rules = selected("rules", "Rules", RULE_NAMES, RULES_HELP) + '<div class="parts" id="parts" hidden>'
+    const rules = selected("rules", "Rules", RULE_NAMES, "Rules: what ants see and who gives way and where scent points. A change starts again.") + '<div class="parts" id="parts" hidden>'
       + `${PART_NAMES.map(([part, words]) => `<label><input type="checkbox" data-part="${part}">${words}</label>`).join("")}</div></div>`;
     const [ants, exploration, ...others] = SLIDERS.filter(({ more }) => !more).map(slider);
-    byId("controls").innerHTML = ants + exploration + switched("learns", "Learning", LEARNING_HELP) + others.join("") + rules;
+    byId("controls").innerHTML = ants + exploration + switched("learns", "Learning", "Learning: while it is off they go on with what they know and learn nothing more") + others.join("") + rules;
     byId("more-controls").innerHTML = SLIDERS.filter(({ more }) => more).map(slider).join("")
       + `${selected("learner", "Learner", LEARNER_NAMES.map(([learner, words]) => [LEARNERS[learner], words]))}</div>`
-      + `${selected("reach", "Brush size", SIZES.map((size, k) => [k, size]))}</div>`
+      + `${selected("reach", "Brush size", ["small", "medium", "large", "huge"].map((size, k) => [k, size]))}</div>`
       + `${selected("place", "World", WORLDS.map(({ name }, k) => [k, PLACES[name]]))}</div>`
       + '<div class="control"><label><span>Seed</span><input type="number" id="seed" min="0" max="4294967295" step="1"></label></div>'
       + `${selected("theme", "Colours", [["dark", "dark"], ["light", "light"]])}</div>`;
@@ -91,29 +87,23 @@ export class Controls {
   /** The scene whose settings the controls change: the right one of two. */
   get scene() { return this.lab.runs[this.lab.runs.length - 1].engine.scene; }
 
-  listen({ name, steps, words, restarts }) {
-    const input = byId(`c-${name}`);
-    const say = () => this.say(name, words(steps[Number(input.value)]));
-    input.addEventListener("input", say);
-    input.addEventListener("change", () => {
-      const value = steps[Number(input.value)];
-      if (restarts) this.lab.restart({ [name]: value });
-      else this.lab.set(name, value);
-    });
+  listen(slider) {
+    const { name, steps, restarts } = slider, input = byId(`c-${name}`), value = () => steps[Number(input.value)];
+    input.addEventListener("input", () => this.say(slider, value()));
+    input.addEventListener("change", () => (restarts ? this.lab.restart({ [name]: value() }) : this.lab.set(name, value())));
   }
 
-  say(name, words) {
-    const input = byId(`c-${name}`);
-    byId(`o-${name}`).textContent = words;
-    input.setAttribute("aria-valuetext", words);
+  say({ name, words }, value) {
+    byId(`o-${name}`).textContent = words(value);
+    byId(`c-${name}`).setAttribute("aria-valuetext", words(value));
   }
 
   /** Show the present settings. */
   show() {
     const { scene } = this, ui = this.lab.ui;
-    for (const { name, steps, words } of SLIDERS) {
-      byId(`c-${name}`).value = String(stepOf(steps, scene[name]));
-      this.say(name, words(scene[name]));
+    for (const slider of SLIDERS) {
+      byId(`c-${slider.name}`).value = String(stepOf(slider.steps, scene[slider.name]));
+      this.say(slider, scene[slider.name]);
     }
     byId("learns").checked = Boolean(scene.learns);
     const foraging = scene.rules && !(scene.rules & PARTS.queues);

@@ -2,9 +2,8 @@
  * rocks and food, pick-ups and deliveries, ants, arrows of the policy, the brush. */
 
 import { CAPACITY } from "./engine.js";
-import { angleOf, centre, ROOT3, scatter } from "./geometry.js";
+import { angleOf, centre, outline, ROOT3, scatter } from "./geometry.js";
 import { fade, LOOKS, scentRamp } from "./looks.js";
-import { outline } from "./shapes.js";
 import { FOOD, hexDistance, ROCK, STEPS } from "./worlds.js";
 
 const DIRECTIONS = 32;          // of the pictures of ants
@@ -38,7 +37,8 @@ export class Painter {
     for (const one of [this.canvas, this.ground, this.things]) [one.width, one.height] = [w, h];
     const margin = 6 * this.dpr, R = e.radius - 1;
     this.s = Math.min((w - 2 * margin) / (3 * R + 2), (h - 2 * margin) / (2 * ROOT3 * R + 1.9)); // pixels per unit of geometry.js
-    this.x0 = w / 2; // where its origin is
+    this.letter = Math.max(10.5 * this.dpr, 1.15 * this.s); // the size of labels
+    this.x0 = w / 2; // where the origin of geometry.js is
     this.y0 = h / 2;
     this.headroom = (h / 2 + (ROOT3 * R + 2) * this.s) / this.dpr; // CSS pixels from the bottom to the top of the world
     this.scent.width = this.scent.height = e.width;
@@ -186,7 +186,7 @@ export class Painter {
     x.restore();
   }
 
-  /** Where to write "food": above each pile. */
+  /** Where to write "food": above some piles, so that labels do not overlap. */
   pilesOf(foods) {
     const e = this.run.engine, piles = [];
     for (const cell of foods) {
@@ -194,10 +194,10 @@ export class Painter {
       if (near) near.push(cell);
       else piles.push([cell]);
     }
-    return piles.filter((pile) => pile.length > 4).slice(0, 4).map((pile) => {
+    return piles.filter((pile) => pile.length > 4).map((pile) => {
       const places = pile.map((cell) => this.place(cell));
-      return [places.reduce((sum, [px]) => sum + px / places.length, 0), Math.min(...places.map(([, py]) => py))];
-    });
+      return [places.reduce((sum, [px]) => sum + px / places.length, 0), Math.min(...places.map(([, py]) => py)) - this.letter];
+    }).filter(([px, py], k, all) => all.slice(0, k).every(([a, b]) => this.isApart(px - a, py - b))).slice(0, 4);
   }
 
   /** Draw a frame. `part` of the present tick has passed, `passed` seconds since the frame before. */
@@ -212,12 +212,12 @@ export class Painter {
     x.drawImage(this.things, 0, 0);
     if (ui.arrows) this.drawArrows(x, ui);
     this.drawSparks(x, passed, ui);
-    const size = Math.max(10.5 * this.dpr, 1.15 * s), [nx, ny] = this.place(e.queen);
+    const size = this.letter, [nx, ny] = this.place(e.queen);
     if (s < DOTS.scale * this.dpr || e.ants > DOTS.ants) this.drawDots(x, part);
     else this.drawAnts(x, part, passed, ui);
     const below = Math.max(4.4 * s, 18 * this.dpr), fits = ny + below + size < this.canvas.height;
     this.label(x, "nest", nx, fits ? ny + below : ny - below, size);
-    for (const [fx, fy] of this.piles) this.label(x, "food", fx, fy - size, size);
+    for (const [fx, fy] of this.piles) this.label(x, "food", fx, fy, size);
     this.labelScent(x, nx, ny, size);
     if (ui.ghost) this.drawGhost(x, ui);
     if (ui.pointer) this.drawBrush(x, ui);
@@ -232,6 +232,9 @@ export class Painter {
     x.shadowBlur = 0;
   }
 
+  /** Whether two labels that are so far apart do not overlap. */
+  isApart(dx, dy) { return Math.abs(dx) > 3.5 * this.letter || Math.abs(dy) > 1.5 * this.letter; }
+
   /** Write "scent" on the way to the food, for as long as scent lies there. */
   labelScent(x, nx, ny, size) {
     const { levels } = this.run.engine, [pile] = this.piles;
@@ -239,7 +242,7 @@ export class Painter {
     for (let cell = 0; pile && !levels[this.scented] && cell < levels.length; cell++) {
       if (levels[cell] < 60) continue;
       const [px, py] = this.place(cell), far = Math.hypot(px - 0.35 * nx - 0.65 * pile[0], py - 0.35 * ny - 0.65 * pile[1]);
-      if (far < near) [near, found] = [far, cell];
+      if (far < near && this.piles.every(([fx, fy]) => this.isApart(px - fx, py - fy))) [near, found] = [far, cell];
     }
     this.scented = found;
     if (found) this.label(x, "scent", ...this.place(found), size);

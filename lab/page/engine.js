@@ -18,7 +18,7 @@
  *       `level` is how long new scent lasts, in ticks; `learns` is 0 or 1. Values are rounded to
  *       what links can have (see LIMITS); `engine.scene` has the result.
  *   engine.forget()       drops the rest of a replay, when the visitor acts
- *   engine.tick, .ants, .deliveries, .returns, .moves, .blocked
+ *   engine.tick, .ants, .deliveries, .returns
  *   engine.changed        true after ground has changed by `apply`; the page sets it to false
  *   engine.hash()         16 hexadecimal digits: two engines with the same hash have the same state
  *
@@ -106,7 +106,6 @@ export class Engine {
     this.scene.ants = Math.min(this.scene.ants, wasm.room());
     this.first = { ...this.scene }; // for links
     this.setNumbers();
-    this.setRate();
     wasm.begin(this.first.seed >>> 0, Math.floor(this.first.seed / 2 ** 32), this.first.ants, this.first.first);
     if (scene.learner === LEARNERS.frozen) this.follow();
     this.brush.set(this.world.scent);
@@ -117,18 +116,17 @@ export class Engine {
   /** Make views of the memory, which does not grow after `lay_out`. */
   look() {
     const at = (k, Kind, n) => new Kind(this.wasm.memory.buffer, this.wasm.array(k), n);
-    const n = CAPACITY;
     this.laid = at(0, Uint8Array, this.size); // with ants; `ground` is that of the frame
     this.shownGround = at(1, Uint8Array, this.size);
     this.shownLevels = at(2, Uint8Array, this.size);
     this.traffic = at(3, Float32Array, this.size);
     this.brush = at(4, Int32Array, this.size);
-    this.cells = at(5, Int32Array, n);
-    this.before = at(6, Int32Array, n);
-    this.before2 = at(7, Int32Array, n);
-    this.headings = at(8, Uint8Array, n);
-    this.looks = at(9, Uint8Array, n);
-    this.states = at(10, Uint16Array, n);
+    this.cells = at(5, Int32Array, CAPACITY);
+    this.before = at(6, Int32Array, CAPACITY);
+    this.before2 = at(7, Int32Array, CAPACITY);
+    this.headings = at(8, Uint8Array, CAPACITY);
+    this.looks = at(9, Uint8Array, CAPACITY);
+    this.states = at(10, Uint16Array, CAPACITY);
     this.values = at(11, Float32Array, 8 * this.wasm.states());
     this.read = at(12, Int32Array, 4);
   }
@@ -146,22 +144,18 @@ export class Engine {
   get ants() { return this.wasm.ants(); }
   get returns() { return this.wasm.count(0); }
   get deliveries() { return this.wasm.count(1); }
-  get moves() { return this.wasm.count(2); }
-  get blocked() { return this.wasm.count(3); }
-
-  setRate() { this.wasm.set_rate(this.scene.learns ? this.scene.rate : 0); }
 
   setNumbers() {
     const s = this.scene, slope = s.rules & PARTS.directed ? Math.max(1, Math.floor((2 * s.level + 50) / 100)) : 0;
+    this.wasm.set_rate(s.learns ? s.rate : 0);
     this.wasm.set_numbers(s.level, slope, s.discount, s.epsilon, s.shaping, s.regrowth);
   }
 
-  /** Give the ants the hand-written policy `trail_follower`, or other values, 5 for each state. */
-  follow(values) {
-    const letters = FOLLOWERS[this.wasm.states()];
-    for (let k = 0; k < this.wasm.states(); k++)
-      for (let a = 0; a < 5; a++)
-        this.values[8 * k + a] = values ? values[5 * k + a] : letters.charCodeAt(k) - 64 >> a & 1;
+  /** Give the ants the hand-written policy `trail_follower`. */
+  follow() {
+    [...FOLLOWERS[this.wasm.states()]].forEach((letter, state) => {
+      for (let a = 0; a < 5; a++) this.values[8 * state + a] = letter.charCodeAt(0) - 64 >> a & 1;
+    });
     this.wasm.read_values();
   }
 
@@ -199,7 +193,6 @@ export class Engine {
     const name = change.do, value = name === "ants" ? Math.min(change.value, this.wasm.room()) : change.value;
     this.scene[name] = allowed(name, value);
     if (name === "ants") this.wasm.set_ants(this.scene.ants);
-    else if (name === "rate" || name === "learns") this.setRate();
     else this.setNumbers();
     this.events.push({ do: name, value: this.scene[name], tick: this.tick });
   }
@@ -305,8 +298,9 @@ export class LoneAnts { // complete in itself, because workers get its text
     const memory = this.wasm.memory.buffer; // it may have grown
     this.values = new Float32Array(memory, done, n * 640).slice();
     const [returns, steps, deliveries] = [0, 1, 2].map((k) => new Int32Array(memory, done + 4 * (n * 640 + k * all), all).slice());
-    const whole = new Int32Array(memory, noted, LoneAnts.NOTES.length * this.wasm.steps_noted()), exact = new Float32Array(memory, noted, whole.length);
-    this.notes = Array.from({ length: this.wasm.steps_noted() }, (_, k) => Object.fromEntries(LoneAnts.NOTES.map((name, j) =>
+    const taken = Math.min(notes, steps.reduce((a, b) => a + b, 0)); // steps that are noted
+    const whole = new Int32Array(memory, noted, LoneAnts.NOTES.length * taken), exact = new Float32Array(memory, noted, whole.length);
+    this.notes = Array.from({ length: taken }, (_, k) => Object.fromEntries(LoneAnts.NOTES.map((name, j) =>
       [name, (name === "value" ? exact : whole)[k * LoneAnts.NOTES.length + j]])));
     return { returns, steps, deliveries };
   }

@@ -10,13 +10,12 @@ export class Film {
   constructor(lab) {
     this.lab = lab;
     this.copy = null; // the canvas that is recorded now
-    byId("film").addEventListener("click", () => this.start());
+    byId("film").addEventListener("click", () => { if (!this.copy) this.start(); });
   }
 
   start() {
     const { lab } = this, type = window.MediaRecorder && TYPES.find((one) => MediaRecorder.isTypeSupported(one));
     if (!type) return lab.toast(CANNOT);
-    if (this.copy) return undefined;
     const canvases = lab.sides.filter((side) => side.run).map((side) => side.canvas);
     const copy = this.copy = document.createElement("canvas"), [{ width, height }] = canvases;
     const side = Math.min(width, height), scale = Math.min(1, MOST_PIXELS_WIDE / (side * canvases.length));
@@ -25,7 +24,7 @@ export class Film {
     const recorder = new MediaRecorder(copy.captureStream(FRAMES), { mimeType: type, videoBitsPerSecond: BITS }), parts = [];
     recorder.addEventListener("dataavailable", (event) => parts.push(event.data));
     recorder.addEventListener("stop", () => this.save(new Blob(parts, { type: type.split(";")[0] })));
-    this.take = () => {
+    this.add = () => { // the frame that was just drawn
       const x = copy.getContext("2d", { alpha: false });
       x.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--bg");
       x.fillRect(0, 0, copy.width, copy.height);
@@ -36,11 +35,7 @@ export class Film {
     recorder.start();
     lab.toast("Recording six seconds …", SECONDS * 1000);
     setTimeout(() => recorder.stop(), SECONDS * 1000);
-    return undefined;
   }
-
-  /** Add the frame that was just drawn. */
-  add() { if (this.copy) this.take(); }
 
   save(blob) {
     this.copy = null;

@@ -65,19 +65,16 @@ export function encode(scene, events) {
       putSetting(event.do, event.value);
       continue;
     }
-    let cells = event.path;
+    const cells = goesOn ? [end, ...event.path] : event.path, steps = cells.slice(1).map((cell, k) => heading(cells[k], cell));
     if (!goesOn) {
       bytes.push(STROKES[event.do] | event.reach << 3);
       put(cells[0]);
-      end = cells[0];
-      cells = cells.slice(1);
     }
-    const steps = cells.map((cell, k) => heading(k ? cells[k - 1] : end, cell));
     for (let k = 0, n; k < steps.length; k += n) {
       for (n = 1; steps[k + n] === steps[k]; n++);
       run(steps[k], n);
     }
-    end = cells.length ? cells[cells.length - 1] : end;
+    end = cells[cells.length - 1];
   }
   if (last) bytes.push(END);
   return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");

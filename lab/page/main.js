@@ -3,13 +3,13 @@
 import { Address } from "./address.js";
 import { Brush } from "./brush.js";
 import { Controls } from "./controls.js";
-import { Daily } from "./daily.js";
+import { beginDaily, dailyStory, isDaily, mayPlace } from "./daily.js";
 import { Painter } from "./draw.js";
 import { Embed } from "./embed.js";
 import { Film } from "./film.js";
 import { mindOf } from "./mind.js";
 import { byId, bytesOf, icon, openPage } from "./page.js";
-import { Plot } from "./plot.js";
+import { drawPlot } from "./plot.js";
 import { Run, TICKS_A_SECOND } from "./run.js";
 import { QUESTIONS, questionStory, settle } from "./scenes.js";
 import { many, storyOf } from "./story.js";
@@ -44,7 +44,6 @@ class Lab {
       const canvas = view.querySelector("canvas");
       return { view, canvas, caption: view.querySelector("figcaption"), painter: new Painter(canvas), run: null };
     });
-    this.plot = new Plot(byId("plot"));
     this.owed = 0;    // ticks that are due
     this.last = 0;    // ms of the last frame, of the last words, and of the first frame
     this.wordsAt = 0;
@@ -59,7 +58,6 @@ class Lab {
     this.controls = new Controls(this);
     this.address = new Address(this);
     this.film = new Film(this);
-    this.daily = new Daily(this);
     this.training = new Training(this, bytesOf("ant.wasm"));
     this.brushes = this.sides.map((side) => new Brush(this, side));
     new ResizeObserver(() => { this.fits = false; }).observe(byId("views"));
@@ -111,7 +109,7 @@ class Lab {
   /** Ask for a prediction; the runs wait until the visitor has said one. */
   ask(question) {
     this.begin(question.sides, { ...question, said: -1, found: null });
-    this.address.name(question.id);
+    this.address.show(question.id);
     this.ui.speed = question.speed;
     this.controls.markSpeed();
     this.play(false);
@@ -120,7 +118,7 @@ class Lab {
   /** A button below the story was pressed: a prediction, or what comes after the answer. */
   say(k) {
     const { question } = this;
-    if (!question) return k === 0 ? this.daily.begin(this.runs[0].scene.seed) : undefined;
+    if (!question) return k === 0 ? beginDaily(this, this.runs[0].scene.seed) : undefined;
     if (question.said < 0) question.said = k;
     else if (k === 0) return this.ask(questionStory(question, this.runs).next);
     else this.home();
@@ -132,7 +130,7 @@ class Lab {
     this.begin();
     this.ui.speed = 1;
     this.controls.markSpeed();
-    this.address.name("");
+    this.address.show("");
   }
 
   /** Start again, with the present settings and these changes; nothing that was drawn is kept. */
@@ -147,8 +145,8 @@ class Lab {
   }
 
   /** A change by the visitor; whatever a replay still holds is dropped. */
-  act(event) {
-    for (const run of this.runs) {
+  act(event, runs = this.runs) {
+    for (const run of runs) {
       run.engine.forget();
       run.apply(event);
     }
@@ -157,16 +155,13 @@ class Lab {
 
   /** Change a setting; of two runs, that of the right one. */
   set(name, value) {
-    const run = this.runs[this.runs.length - 1];
-    run.engine.forget();
-    run.apply({ do: name, value });
+    this.act({ do: name, value }, this.runs.slice(-1));
     this.controls.show();
-    this.address.save();
   }
 
   mayDraw() {
     const [run] = this.runs;
-    if (!Daily.is(run) || this.ui.brush !== "rock" || this.daily.mayDraw(run)) return true;
+    if (!isDaily(run) || this.ui.brush !== "rock" || mayPlace(run)) return true;
     this.toast(run.tick < 2000 ? "All ten rocks are placed." : "The time is over. Start again to play.");
     return false;
   }
@@ -190,7 +185,6 @@ class Lab {
     this.ui.playing = on;
     byId("play").innerHTML = icon(on ? "pause" : "play");
     byId("play").setAttribute("aria-label", on ? "Pause" : "Play");
-    return undefined;
   }
 
   choose(brush) {
@@ -235,7 +229,7 @@ class Lab {
     }
     for (const { painter, run } of this.sides) if (run) painter.frame(ui.speed > 3 ? 1 : this.owed, passed, ui);
     this.firstFrame ||= performance.now(); // ms since the page was opened
-    this.film.add();
+    if (this.film.copy) this.film.add();
     if (now - this.wordsAt > WORDS_MS) {
       this.wordsAt = now;
       this.words();
@@ -245,7 +239,7 @@ class Lab {
   words() {
     const { ui } = this, runs = this.runs, run = runs[runs.length - 1];
     /** @type {import("./story.js").Story} */
-    const told = this.question ? questionStory(this.question, runs) : Daily.is(run) ? this.daily.story(run) : storyOf(run);
+    const told = this.question ? questionStory(this.question, runs) : isDaily(run) ? dailyStory(run) : storyOf(run);
     if (told.id !== this.told) {
       this.told = told.id;
       this.restartAnimation(told);
@@ -262,7 +256,7 @@ class Lab {
     byId("undo").disabled = !runs.some(hasStroke);
     byId("tick").textContent = many(run.tick);
     byId("hash").textContent = run.engine.hash();
-    this.plot.draw(runs);
+    drawPlot(byId("plot"), runs);
     if (!byId("mind").hidden && this.minds++ % 3 === 0) byId("table").innerHTML = mindOf(run, ui);
   }
 

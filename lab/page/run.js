@@ -14,7 +14,6 @@ const SAME_STROKE = 40;                // ticks between the pieces of a wall
 const STOPPED = 450;                   // ticks without a detour
 const DETOUR = 10;                     // loads that come round a wall
 const MOST_SPARKS = 80;
-const PICKED_UP = EVENTS.pickedUp, DELIVERED = EVENTS.delivered;
 
 export class Run {
   /** @param {WebAssembly.Module} module  @param {import("./worlds.js").Scene} scene  @param {any[]} events a replay, see engine.js */
@@ -84,11 +83,11 @@ export class Run {
     for (let i = 0; i < e.ants; i++) {
       const event = e.looks[i] >> 1 & 7, cell = e.cells[i];
       this.visits[e.states[i]]++;
-      if (event === PICKED_UP) {
+      if (event === EVENTS.pickedUp) {
         this.picked[i] = this.isGift(cell) ? -1 : tick;
         if (facts.firstFood < 0) [facts.firstFood, facts.firstAnt] = [tick, i];
         if (this.sparks.length < MOST_SPARKS) this.sparks.push({ cell, food: true, age: 0 });
-      } else if (event === DELIVERED) {
+      } else if (event === EVENTS.delivered) {
         if (facts.firstHome < 0) facts.firstHome = tick;
         if (this.wall && this.picked[i] > this.wall.last) this.noteDetour();
         if (this.sparks.length < MOST_SPARKS) this.sparks.push({ cell: e.queen, food: false, age: 0 });

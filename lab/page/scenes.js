@@ -6,7 +6,6 @@ import { bold, many, seconds } from "./story.js";
 import { SCENE, WORLDS } from "./worlds.js";
 
 const PAID = { ...SCENE, world: WORLDS.findIndex(({ name }) => name === "paper"), ants: 4, rules: RULES.paper, discount: 0.99, level: 250, seed: 8 };
-const ALONE = { ...SCENE, ants: 1 };
 const HOMEWARD = { ...SCENE, rules: RULES.paper };
 const MIDDLE = { ...SCENE, seed: 88 };
 
@@ -30,8 +29,6 @@ export function longShare({ engine }) {
   }
   return all ? Math.round(100 * long / all) : 0;
 }
-
-const more = (a, b) => `${(b ? a / b : a).toFixed(1)} times as much`;
 
 /**
  * `sides`: one run, or two with the same world and seed; `skip` ticks have passed before the question.
@@ -57,7 +54,7 @@ export const QUESTIONS = [
     ask: "64 copies of one good ant. How much food?", options: ["As much as the left", "More", "Far less"],
     sub: "On the left, 64 ants learned together. On the right, one ant learned alone, and now there are 64 copies of it. Nobody learns any more.",
     sides: [{ label: "learned together", scene: SCENE, events: [{ tick: 8000, do: "learns", value: 0 }], skip: 8000 },
-            { label: "64 copies", scene: ALONE, skip: 20000,
+            { label: "64 copies", scene: { ...SCENE, ants: 1 }, skip: 20000,
               events: [{ tick: 20000, do: "learns", value: 0 }, { tick: 20000, do: "ants", value: 64 }] }],
     answer: ([left, right]) => {
       const share = right.food / Math.max(1, left.food);
@@ -74,7 +71,7 @@ export const QUESTIONS = [
     answer: ([left, right]) => {
       const ratio = right.food / Math.max(1, left.food);
       return { right: ratio > 1.25 ? 2 : ratio < 0.8 ? 0 : 1, head: ratio > 1.25 ? "The left trail points home." : "It hardly mattered.",
-               sub: `Right: ${bold(more(right.food, left.food))} food. On the left, an ant that follows the scent uphill walks after ants with food, `
+               sub: `Right: ${bold(`${ratio.toFixed(1)} times as much`)} food. On the left, an ant that follows the scent uphill walks after ants with food, `
                  + "to the nest, where no food is." };
     },
   },

@@ -27,16 +27,14 @@ const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
 /** The mean of the middle half. */
 const interquartileMean = (values) => mean([...values].sort((a, b) => a - b).slice(SEEDS / 4, 3 * SEEDS / 4));
 
-/** For each run, its mean over the last episodes. */
-const lastOf = (values, seeds) => Array.from({ length: seeds }, (_, k) => mean(values.subarray((k + 1) * EPISODES - LAST, (k + 1) * EPISODES)));
+/** For each run, its mean over some episodes: by default, the last ones. */
+const meansOf = (values, from = EPISODES - LAST, n = LAST) => Array.from({ length: SEEDS }, (_, k) => mean(values.subarray(k * EPISODES + from, k * EPISODES + from + n)));
 
-/** Points of a curve: episode, mean over seeds, and half the width of its 95 % interval. */
-function curveOf(returns, seeds) {
-  return Array.from({ length: EPISODES / SMOOTH }, (_, point) => {
-    const each = Array.from({ length: seeds }, (__, k) => mean(returns.subarray(k * EPISODES + point * SMOOTH, k * EPISODES + (point + 1) * SMOOTH)));
-    const middle = mean(each), deviation = Math.sqrt(each.reduce((sum, v) => sum + (v - middle) ** 2, 0) / (seeds - 1));
-    return { episode: (point + 0.5) * SMOOTH, mean: middle, half: 1.96 * deviation / Math.sqrt(seeds) };
-  });
+/** A curve: means over seeds, and half the widths of their 95 % intervals. @returns {[number[], number[]]} */
+function curveOf(returns) {
+  const points = Array.from({ length: EPISODES / SMOOTH }, (_, point) => meansOf(returns, point * SMOOTH, SMOOTH));
+  const halfOf = (values) => 1.96 * Math.sqrt(mean(values.map((v) => (v - mean(values)) ** 2)) / (SEEDS - 1));
+  return [points.map(mean), points.map(halfOf)];
 }
 
 export class Training {
@@ -45,7 +43,6 @@ export class Training {
     this.lab = lab;
     this.bytes = bytes;
     this.dialog = byId("training");
-    this.curves = [];
     byId("train").addEventListener("click", () => this.open());
     this.dialog.addEventListener("click", ({ target }) => { if (target === this.dialog) this.dialog.close(); });
     this.dialog.addEventListener("close", () => this.stop());
@@ -109,13 +106,13 @@ export class Training {
   async one() {
     const began = performance.now(), setting = this.chosen();
     await this.train([setting], ({ returns, steps, deliveries }) => {
-      const [home, points] = [lastOf(deliveries, SEEDS), lastOf(returns, SEEDS)];
-      this.curves = [...this.curves.slice(-2), { setting, points: curveOf(returns, SEEDS) }];
+      const [home, points] = [meansOf(deliveries), meansOf(returns)];
+      this.curves = [[CHOICES.map(([name]) => wordingOf(name, setting)).join(" · "), ...curveOf(returns)], ...this.curves.slice(0, 2)];
+      byId("t-plot").innerHTML = plotOf(this.curves, `Return of an episode, from the first to episode ${EPISODES}: mean of ${SEEDS} ants with its 95 % interval`);
       byId("t-results").innerHTML = `<p>${SEEDS} ants, ${many(steps.reduce((a, b) => a + b, 0))} steps, ${((performance.now() - began) / 1000).toFixed(1)} s. `
         + `In the last ${LAST} episodes: return <b>${mean(points).toFixed(1)}</b> (mean), <b>${interquartileMean(points).toFixed(1)}</b> (IQM, the middle half of the ants); `
         + `deliveries per episode <b>${mean(home).toFixed(2)}</b> and <b>${interquartileMean(home).toFixed(2)}</b>.</p>`;
     });
-    this.draw();
   }
 
   /** The paper's 128 settings with 100 seeds each: a dot for the IQM of each, and the best five. */
@@ -124,7 +121,7 @@ export class Training {
     bar.hidden = false;
     byId("t-results").textContent = "";
     await this.train(GRID, ({ returns, deliveries }, setting) => {
-      const [points, home] = [lastOf(returns, SEEDS), lastOf(deliveries, SEEDS)];
+      const [points, home] = [meansOf(returns), meansOf(deliveries)];
       rows.push({ setting, mean: mean(points), iqm: interquartileMean(points), home: interquartileMean(home) });
       bar.value = rows.length / GRID.length;
       this.drawGrid(rows);
@@ -135,13 +132,6 @@ export class Training {
     byId("t-results").innerHTML = `<p>${many(GRID.length * SEEDS)} ants in ${((performance.now() - began) / 1000).toFixed(1)} s. The five settings with the highest IQM of the return:</p>`
       + tableOf([...CHOICES.map(([, label]) => label), "Mean", "IQM", "Deliveries (IQM)"],
                 best.map((row) => [...CHOICES.map(([name]) => wordingOf(name, row.setting)), row.mean.toFixed(1), row.iqm.toFixed(1), row.home.toFixed(2)]));
-  }
-
-  /** The latest curve first. */
-  draw() {
-    const lines = [...this.curves].reverse().map(({ setting, points }) => /** @type {[string, number[], number[]]} */ (
-      [CHOICES.map(([name]) => wordingOf(name, setting)).join(" · "), points.map((p) => p.mean), points.map((p) => p.half)]));
-    byId("t-plot").innerHTML = plotOf(lines, `Return of an episode, from the first to episode ${EPISODES}: mean of ${SEEDS} ants with its 95 % interval`);
   }
 
   /** For each learner, a dot for the IQM of each setting. */

@@ -7,7 +7,7 @@ import taichi as ti
 
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import Observation
-from taichi_ants.task.rules.vision import see_by_level, see_carrying, see_foraging, state_index
+from taichi_ants.task.rules.vision import see_by_level, see_carrying, state_index
 
 
 @cache
@@ -55,7 +55,7 @@ def fill_codes(
             carrying = see_carrying(view.codes[k], view.nearer[k])
         else:
             carrying = see_by_level(homing == "half", view.codes[k] >> 2, level, view.strongest)
-        foraging = see_foraging(half, view.codes[k], level, view.strongest)
+        foraging = see_by_level(half, view.codes[k] & 3, level, view.strongest)
         view.codes[k] = ti.select(view.carries == 1, carrying, foraging)
     view.paper_state = state_index(
         view.carries, view.codes[left], view.codes[forward], view.codes[right]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.kernel_functions import kernel_function
 from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 
@@ -25,10 +25,6 @@ class Memory:
     tables: int = 0
     floats: int = 0
     integers: int = 0
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            checked_whole(f"{name} of a memory", value, 0, 2**30)
 
 
 @dataclass(frozen=True)

@@ -63,15 +63,18 @@ class Player(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """An image, uint8 (height, width, 3), with alternative text (`words`)."""
+    """An image as a PNG in base64 (`data`), with alternative text (`words`)."""
 
     words: str
-    image: np.ndarray
+    width: int
+    height: int
+    data: str
 
-    @property
-    def data(self) -> str:
-        """A PNG as base64."""
-        return base64.b64encode(png(self.image, optimize=True)).decode()
+    @classmethod
+    def of(cls, words: str, image: np.ndarray) -> Picture:
+        """Return the picture of an image, uint8 (height, width, 3)."""
+        height, width, _ = image.shape
+        return cls(words, width, height, base64.b64encode(png(image, optimize=True)).decode())
 
 
 class ShownFinding(NamedTuple):

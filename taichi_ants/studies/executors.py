@@ -20,9 +20,11 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
+from multiprocessing.util import Finalize
+from pathlib import Path
 from typing import Any, TypeVar
 
-from taichi_ants import PHYSICS, __version__
+from taichi_ants import PHYSICS, __version__, runtime
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies.interruption import stop_if_noted
@@ -140,8 +142,6 @@ class Workers(Executor):
         self._calls: list[set[Future[Any]]] = [set() for _ in range(workers)]
         # The workers have one end. They see that the other one is closed, also by a crash.
         self._end, self._line = multiprocessing.Pipe(duplex=False)
-        # Taichi cannot be forked.
-        self._start = multiprocessing.get_context("spawn"), _end_with, (self._end,)
 
     def submit(self, call: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
         """Return the future of a call in the worker that has the fewest calls."""
@@ -151,18 +151,23 @@ class Workers(Executor):
         with _without_ctrl_c():
             for _ in range(TRIES):
                 with suppress(BrokenExecutor):
-                    pool = self._pools[n] = self._pools[n] or ProcessPoolExecutor(1, *self._start)
+                    pool = self._pools[n] = self._pools[n] or self._new_pool()
                     future = pool.submit(call, *given, **named)
                     self._calls[n].add(future)
                     return future
                 self._pools[n] = None
         raise BrokenExecutor("worker processes die as soon as they start")
 
+    def _new_pool(self) -> ProcessPoolExecutor:
+        # A fork spares imports. It has none of the threads of this process, and Taichi needs its.
+        tasks = Path("/proc/self/task")  # on Linux
+        kind = "fork" if tasks.is_dir() and len([*tasks.iterdir()]) == 1 else "spawn"
+        lines = self._end, self._line
+        return ProcessPoolExecutor(1, multiprocessing.get_context(kind), _end_with, lines)
+
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the workers after their calls; they save the kernels that they have compiled."""
-        for pool in filter(None, self._pools):
-            pool.shutdown(wait=False, cancel_futures=cancel_futures)
-        for pool in filter(None, self._pools):
+        for pool in filter(None, self._pools):  # one by one: a second call would not wait
             pool.shutdown(wait, cancel_futures=cancel_futures)
 
     def __exit__(self, kind: object, *raised: object) -> None:
@@ -186,13 +191,16 @@ def _without_ctrl_c() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _end_with(line: Connection) -> None:
-    """Ignore Ctrl-C, and end this process when the other end of a line is closed."""
+def _end_with(end: Connection, line: Connection) -> None:
+    """Ignore Ctrl-C, and end this process when the first process closes its end of a line."""
+    line.close()  # the copy of that end
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    Finalize(None, runtime.stop, exitpriority=0)  # a fork ends without its exit handlers
 
     def wait() -> None:
         with suppress(EOFError, OSError):
-            line.recv()
+            end.recv()
         os._exit(1)
 
     threading.Thread(target=wait, daemon=True).start()

@@ -1,12 +1,9 @@
 """What an ant does instead of delivering: constructed policies, exact cases, and the borders."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from named_states import parse_state
 
 from taichi_ants import Task, rollout
 from taichi_ants.analysis.behaviour import (
@@ -18,10 +15,11 @@ from taichi_ants.analysis.behaviour import (
     classify,
 )
 from taichi_ants.learners import policies
-from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT, SEES_CUE
-from taichi_ants.task.states import state_from_index
+from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_STATES, PICK_UP, RIGHT, SEES_CUE
+from taichi_ants.task.states import state_from_index, state_name
 from taichi_ants.worlds import paper
 
+STATES = [state_name(index) for index in range(N_STATES)]
 STILL = Task(evaporation_in_evaluation=False)
 STEPS = 600
 
@@ -87,7 +85,7 @@ def made(n=16, name="foraging E T E", every=4, start=0, delivered=False):
     return SimpleNamespace(
         episodes=np.full(n, 5),
         steps=numbers,
-        paper_states=np.full(n, parse_state(name)),
+        paper_states=np.full(n, STATES.index(name)),
         actions=np.where((numbers - start) % every == 0, FORWARD, LEFT),
         rewards=np.full(n, -7),
         delivered=ends & delivered,

@@ -1,7 +1,5 @@
 """The exact bounds: by hand, and against plain searches."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -7,8 +7,6 @@ after it. A policy that never delivers returns at most the reward of this pick-u
 adds that of a delivery, at every discount.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.sparse import coo_array

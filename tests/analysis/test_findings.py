@@ -1,7 +1,5 @@
 """How intervals become verdicts, for each kind of claim."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

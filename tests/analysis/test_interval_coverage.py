@@ -6,8 +6,6 @@ replacement, again and again, and the intervals of each draw are held against th
 `pytest -m long -rP` it prints the tables of docs/concepts/statistics.md.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from finished_pages import results

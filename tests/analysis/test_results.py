@@ -1,7 +1,5 @@
 """Results as tidy rows, with summaries, figures and paired comparisons."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 

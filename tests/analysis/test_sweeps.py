@@ -1,7 +1,5 @@
 """What tables and figures of sweeps show."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Numbers and tables as text."""
 
-from __future__ import annotations
-
 import math
 
 from taichi_ants.analysis.tables import (

@@ -1,9 +1,6 @@
 """The benchmark of a GPU, without one."""
 
-from __future__ import annotations
-
 import ctypes
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import gpu
@@ -43,12 +40,6 @@ def test_results_that_differ_are_an_error(monkeypatch, capsys):
     assert "training: sarsa  DIFFERENT\n" in printed.out
     assert "training: sarsa_lambda  FAILED: 'sarsa_lambda-0'\n" in printed.out
     assert printed.err == "error: some parts failed, or differ from those of a CPU.\n"
-
-
-def test_parts_are_left_out_after_some_time(monkeypatch, capsys):
-    monkeypatch.setattr(gpu, "compared", lambda case, expected: time.sleep(0.1))
-    run("--on-cpu", "--only", "colony", "--seconds", "0")
-    assert capsys.readouterr().out.count("  left out\n") == len(gpu.record.drawing.GROUPS)
 
 
 def test_without_a_gpu_it_says_so(monkeypatch, capsys):

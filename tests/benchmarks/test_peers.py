@@ -1,12 +1,12 @@
-"""Peers that train in the paper's world train as we do; the command and what it writes."""
-
-from __future__ import annotations
+"""Peers train in the paper's world as we do, and the soak finds faults put into a colony."""
 
 import numpy as np
 import pytest
+import soak
 from systems import numpy_runs
 
 from taichi_ants import Task, TrainingConfig, train, worlds
+from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.runs.training import trace_training
 from taichi_ants.task.constants import Event
 
@@ -52,3 +52,13 @@ def test_numba_gives_the_same_runs(ours):
 
     theirs = numba_runs.train(CONFIGS, SEEDS, EPISODES, STEPS, parallel=True)
     assert all(map(np.array_equal, ours, theirs))
+
+
+@pytest.mark.slow
+def test_faults_are_found():
+    colony = soak.new_colony("paper", 200)
+    colony.tick(100)
+    assert soak.faults(colony) == []
+    colony.arrays["cell"][0] = colony.arrays["cell"][1]
+    colony.arrays["worlds"][WorldRow.LIVING, 0] -= 1
+    assert {"ants share a cell", "ants were lost"} <= set(soak.faults(colony))

@@ -1,7 +1,5 @@
 """The command `sweep`, called in the process of the test."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Single colonies as a command: files held against the library."""
 
-from __future__ import annotations
-
 import os
 import signal
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Studies that grow, shards, and damage: the bytes of one plain run, by any way."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -46,19 +44,9 @@ ants = 4
 episodes = 2
 ticks = 60
 rollouts = 2
-[world]
-preset = "open"
-ranges = [12, 12, 12]
-per_seed = true
-[task]
-evaporation_in_training = true
-life.regrowth = 0
-[training]
-learner = "sarsa"
-learning_rate = 0.1
-discount = 0.9
-epsilon = 0.3
-epsilon_decay = 0.9
+training = {learner = "sarsa", learning_rate = 1, discount = 0.9, epsilon = 0.3, epsilon_decay = 1}
+world = {preset = "open", ranges = [12, 12, 12], per_seed = true}
+task = {evaporation_in_training = true, life.regrowth = 0}
 [vary]
 task.rewards.shaping = [1, 0]
 """

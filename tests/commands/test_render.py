@@ -1,23 +1,20 @@
 """The command line of `taichi-ants render`, from outside."""
 
-from __future__ import annotations
-
 import re
-import signal
 import subprocess
-import time
 from pathlib import Path
 
 import gallery
 import numpy as np
 import pytest
-from command_lines import ROOT, assert_one_sentence, call, start
+from command_lines import ROOT, assert_one_sentence, call
 from command_lines import run as process
 from PIL import Image
 
 from taichi_ants import commands
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
+from taichi_ants.rendering import writers
 
 
 @pytest.fixture
@@ -117,21 +114,14 @@ def test_mistakes_are_one_sentence(tmp_path, policy, name, run) -> None:
     assert files_in(tmp_path) == []
 
 
-@pytest.mark.slow
-def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, kernels) -> None:
-    # An ant that moves at random has far more steps to take than there is time for.
-    arguments = ["episode", "--policy", str(policy), "--epsilon", "1", "--max-steps", "100000"]
-    arguments += ["--world", "open", "--size", "1600x1200"]
-    arguments += ["--out", str(tmp_path / "new" / "a.gif")]
-    with start("render", arguments, kernels, tmp_path) as running:
-        time.sleep(2.5)  # it draws, into memory
-        running.send_signal(signal.SIGINT)
-        try:
-            _, errors = running.communicate(timeout=30)
-        finally:
-            running.kill()
-    assert running.returncode == 130
-    assert errors == "Stopped; nothing was left behind.\n"
+def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, run, monkeypatch) -> None:
+    def stopped(frames, *more, **named) -> None:
+        next(iter(frames))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(writers, "_with_palette", stopped)
+    status, _, err = run("episode", "--policy", policy, "--out", tmp_path / "new" / "a.gif")
+    assert (status, err) == (130, "Stopped; nothing was left behind.\n")
     assert files_in(tmp_path) == []
 
 

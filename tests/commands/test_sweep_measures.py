@@ -1,7 +1,5 @@
 """Sweeps with registered measures, series over time, and policies without learning."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -242,6 +240,7 @@ def test_runs_without_a_value_are_left_out_and_counted(tmp_path):
     assert float(found[0]["difference"]) == pytest.approx(wanted)
     assert found[1]["finding"] == "undecided"
     assert "runs without a value are left out" in " ".join(report.split())
+    assert "entropy.trail against ants 2" in report
     assert "] (2 left out)" in report
     assert "- (12 left out)" in report
     assert "left out" not in write(np.nan_to_num(values), figures=False)

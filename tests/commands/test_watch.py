@@ -1,7 +1,5 @@
 """The command that serves the live page: how it begins and ends, and what it needs."""
 
-from __future__ import annotations
-
 import re
 import signal
 import sys

@@ -1,7 +1,5 @@
 """The lessons in docs/lessons/: what they show is what they give when they are run afresh."""
 
-from __future__ import annotations
-
 import importlib.util
 import io
 import json

@@ -1,7 +1,5 @@
 """Numbers and tables in pages are those of docs/results/data, which commands write."""
 
-from __future__ import annotations
-
 import re
 import sys
 

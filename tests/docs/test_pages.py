@@ -5,8 +5,6 @@ is left out. A comment behind a `print` begins with what it prints, if it begins
 so do the lines of a `text` block that follows.
 """
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The reference: what declarations give, and an example that runs for each public object."""
 
-from __future__ import annotations
-
 import doctest
 import importlib.util
 import inspect

@@ -1,7 +1,5 @@
 """The Python of docs/how-to/sweeps.md repeats rows of sweeps exactly."""
 
-from __future__ import annotations
-
 import pytest
 from command_lines import ROOT
 

@@ -77,36 +77,6 @@ def test_guards_hide_products_and_quotients_of_reals_from_the_compiler():
     assert not changed[-1]
 
 
-UNLIKE = """
-import numpy as np, taichi as ti
-from taichi_ants.arithmetic.guards import guarded
-from contextlib import nullcontext
-
-ti.init(arch=ti.cpu, fast_math=True, offline_cache=False, log_level=ti.ERROR)
-numbers = ti.types.ndarray(ti.f64, 1)
-
-def quotients(x, y, z, guards):
-    @ti.kernel
-    def kernel(x: numbers, y: numbers, z: numbers, zero: ti.i32):
-        for i in range(1000):
-            x[i], y[i] = x[i] / z[i] + x[i] / 5.0, y[i] / z[i]
-    x, y = x.copy(), y.copy()
-    with guards:
-        kernel(x, y, z, 0)
-    return x, y
-
-x, y, z = np.random.default_rng(1).random((3, 1000))
-for guards, equal in (nullcontext(), False), (guarded(3), True):
-    first, second = quotients(x, y, z, guards)
-    assert ((first == x / z + x / 5).all() and (second == y / z).all()) is np.bool_(equal), equal
-"""
-
-
-def test_divisors_are_guarded_against_a_compiler_that_multiplies_by_reciprocals(tmp_path):
-    # As that of a CPU does only with fast_math.
-    run_script(UNLIKE, tmp_path, TI_ADVANCED_OPTIMIZATION="1")
-
-
 def run_script(text, folder, **variables):
     script = folder / "script.py"  # Taichi reads the source of kernels
     script.write_text(text, encoding="utf-8")

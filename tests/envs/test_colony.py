@@ -9,6 +9,7 @@ from random_choices import NOISE
 from random_colonies import RandomColony, random_colony
 from random_rewards import random_rewards
 from same_colonies import assert_equal
+from same_steps import likely
 
 from taichi_ants.envs.colony import ColonyWorlds
 from taichi_ants.envs.vector import Arguments
@@ -34,13 +35,6 @@ def plain_one(worlds: ColonyWorlds, seed: int) -> ReferenceColony:
         sharing="frozen",
         q_values=np.zeros((ours.task.n_states, N_ACTIONS), np.float32),
     )
-
-
-def likely(rng: np.random.Generator, masks: np.ndarray) -> np.ndarray:
-    """Mostly actions that can succeed, pick-up and give above all; else any."""
-    worth = rng.random(masks.shape) + 2 * masks * (rng.random(masks.shape[:-1]) < 0.8)[..., None]
-    worth[..., PICK_UP:] += masks[..., PICK_UP:]
-    return worth.argmax(axis=-1)
 
 
 def compare_step(worlds: ColonyWorlds, world: int, plain: ReferenceColony, actions) -> None:

@@ -7,15 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from colonies import act, training
 from pettingzoo.test import parallel_api_test, parallel_seed_test
-from same_colonies import assert_equal
+from same_steps import likely
 
 from taichi_ants import AntsError, Task, worlds
 from taichi_ants.envs import Event, colony_v0
-from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Life
-from taichi_ants.task.constants import GIVE, N_ACTIONS, PICK_UP
+from taichi_ants.task.constants import GIVE, PICK_UP
 from taichi_ants.task.task import foraging, paper, queueing
 
 MEADOW = worlds.open_world(3, (8, 8, 8))
@@ -27,15 +25,6 @@ def colony(task: Task = LIVELY, **options):
     return colony_v0.parallel_env(
         **{"world": MEADOW, "task": task, "ants": 5, "max_steps": 120, **options}
     )
-
-
-def guided(infos: dict, rng: np.random.Generator) -> dict[str, int]:
-    """Actions that can succeed, giving and picking up above all."""
-    worth = np.array([0, 0, 0, 1, 1])
-    return {
-        name: int((said["action_mask"] * (rng.random(N_ACTIONS) + worth)).argmax())
-        for name, said in infos.items()
-    }
 
 
 @pytest.mark.parametrize(
@@ -57,48 +46,43 @@ def test_pettingzoo_finds_no_fault(name):
         parallel_seed_test(lambda: colony(TASKS[name]), num_cycles=30)
 
 
-def test_agents_are_the_ants_of_the_reference_by_number():
-    """Who lives, what each sees, earns and does, until the end of two episodes.
+def test_agents_are_the_living_ants_by_number():
+    """Who lives, what each observes, earns and does, until the end of two episodes.
 
-    Ants die with food, and others are born into their slots, whose trails begin anew.
+    Ants die with food, and others are born into their slots. `test_colony.py` compares all that
+    they do with the reference.
     """
     env = colony(observation_format="index", ants=16, max_steps=90)
-    rules = replace(LIVELY, evaporation_in_evaluation=LIVELY.evaporation_in_training)
-    table = np.zeros((rules.n_states, N_ACTIONS), np.float32)
-    plain = ReferenceColony(*(MEADOW, rules, training(), 6, 16), sharing="frozen", q_values=table)
-    rng = np.random.default_rng(8)
+    rng, ours = np.random.default_rng(8), env._worlds
     for seed in (6, None):
         observations, infos = env.reset(seed=seed)
-        plain.begin_episode()
         ever, step = set(env.agents), 0
         while env.agents:
-            ants = {f"ant_{ant.number}": ant for ant in plain.ants.values()}
-            assert_equal(env._worlds.colony, plain)
-            assert set(env.agents) == ants.keys()
-            assert {name: observations[name] for name in ants} == {
-                name: ant.state for name, ant in ants.items()
-            }
-            assert {infos[name]["state"] for name in ants} == {ant.state for ant in ants.values()}
-            acting = list(env.agents)
-            actions = guided({name: infos[name] for name in acting}, rng)
-            in_order = sorted(ants.items(), key=lambda item: item[1].slot)
-            act(plain, *(actions[name] for name, _ in in_order))
+            living = ours.colony.living[0]
+            slots = {f"ant_{ours.colony.numbers[0, k]}": k for k in np.flatnonzero(living)}
+            assert set(env.agents) == slots.keys()
+            states = {name: ours.colony.states[0, k] for name, k in slots.items()}
+            assert {name: observations[name] for name in slots} == states
+            assert {name: infos[name]["state"] for name in slots} == states
+            actions = {name: int(likely(rng, infos[name]["action_mask"])) for name in env.agents}
             observations, rewards, terminated, truncated, infos = env.step(actions)
             step += 1
-            for name in acting:
-                assert rewards[name] == ants[name].reward
-                assert terminated[name] == (ants[name] not in plain.ants.values())
+            numbers = ours.colony.numbers[0, ours.colony.living[0]]
+            for name, k in slots.items():
+                assert (rewards[name], infos[name]["event"]) == (
+                    ours.rewards[0, k],
+                    ours.events[0, k],
+                )
+                assert terminated[name] == (int(name[4:]) not in numbers)
                 assert truncated[name] == (step == 90)
-            for passed in plain.transitions:
-                assert infos[f"ant_{passed.number}"]["event"] == passed.event
-            for name in set(observations) - set(acting):  # the newborn
+            for name in set(observations) - slots.keys():  # the newborn
                 assert name not in ever
                 assert (rewards[name], terminated[name], truncated[name]) == (0, False, False)
                 assert infos[name]["event"] == Event.NONE
             ever |= set(observations)
-        plain.end_episode()
-        assert plain.record.births > 2
-        assert plain.record.deaths > 3
+        outcome = ours.colony.outcome()
+        assert outcome.births[0, 0] > 2
+        assert outcome.deaths[0, 0] > 3
         assert ever <= set(env.possible_agents)
         assert step == 90
 

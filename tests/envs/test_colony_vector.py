@@ -6,27 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from same_steps import assert_same
+from same_steps import assert_same, likely
 
-from taichi_ants import AntsError, Task, worlds
+from taichi_ants import AntsError, worlds
 from taichi_ants.envs import Event
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
 from taichi_ants.task.task import foraging
 
 ANTS = 6
-GOES_ON = Task(delivery="truncates")
 MEADOW = worlds.open_world(3, (8, 8, 8))
-
-
-def ants_of(n_worlds: int = 2, task: Task = GOES_ON, **options) -> HexColonyVectorEnv:
-    given = {"world": MEADOW, "ants": ANTS, "max_steps": 20, "observation_format": "index"}
-    return HexColonyVectorEnv(n_worlds * ANTS, task=task, **{**given, **options})
-
-
-def guided(masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Actions that can succeed, giving and picking up above all."""
-    return (masks * (rng.random(masks.shape) + [0, 0, 0, 1, 1])).argmax(axis=1)
 
 
 @pytest.mark.parametrize(
@@ -36,10 +25,11 @@ def guided(masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def test_each_world_is_the_parallel_environment_of_its_seed(form, delivery):
     """Different worlds in one batch; observations, rewards, states, masks and events."""
     places = [MEADOW, worlds.open_world(4, (8, 8, 8))]
-    rules = {"task": foraging(), "observation_format": form}
-    many = ants_of(2, world=places, **{**rules, "task": replace(foraging(), delivery=delivery)})
+    rules = {"task": foraging(), "observation_format": form, "ants": ANTS, "max_steps": 20}
+    ends = {**rules, "task": replace(foraging(), delivery=delivery)}
+    many = HexColonyVectorEnv(2 * ANTS, places, **ends)
     delivered = 0
-    single = [parallel_env(one, ants=ANTS, max_steps=20, **rules) for one in places]
+    single = [parallel_env(one, **rules) for one in places]
     seen, infos = many.reset(seed=7)
     theirs = [env.reset(seed=7 + w) for w, env in enumerate(single)]
     rng = np.random.default_rng(1)
@@ -52,7 +42,7 @@ def test_each_world_is_the_parallel_environment_of_its_seed(form, delivery):
                 for name, value in said[f"ant_{i}"].items():
                     if name != "deliveries" or delivery == "truncates":
                         assert_same(infos[name][w * ANTS + i], value)
-        actions = guided(infos["action_mask"], rng)
+        actions = likely(rng, infos["action_mask"])
         seen, rewards, terminated, truncated, infos = many.step(actions)
         assert all(infos[f"_{name}"].all() for name in ("state", "event", "action_mask"))
         over, last = terminated | truncated, infos.get("final_info", {})

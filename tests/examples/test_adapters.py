@@ -1,7 +1,5 @@
 """The adapters in examples/: data sets of Minari, vector environments of Stable-Baselines3."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The scripts in experiments: their own computations, with inputs and results made by hand."""
 
-from __future__ import annotations
-
 import inspect
 import runpy
 from types import SimpleNamespace
@@ -9,14 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ant_system import Search, search
+from ant_system import Search
 from command_lines import EXPERIMENTS, run
 from matplotlib.figure import Figure
 from utility import Foraging
 
 from taichi_ants import World
 from taichi_ants.learners import registry as learners
-from taichi_ants.task import Caste, Threshold
 from taichi_ants.worlds import double_bridge, paper
 
 # The centre of a world and the six cells around it, in order.
@@ -51,11 +48,8 @@ class Given:
     def __init__(self, *arguments: Any, **settings: Any) -> None:
         self.q_values = None
 
-    def run(self, episodes: int, ticks: int) -> Given:
+    def run(self, episodes: int, ticks: int):
         return self
-
-
-# experiments/models/home_trail.py
 
 
 def test_home_trail_averages_the_last_five_episodes(script):
@@ -67,9 +61,6 @@ def test_home_trail_averages_the_last_five_episodes(script):
     assert rows[:2] == [("compass", 3, 0, 100), ("compass", 3, 1, 1)]
     assert rows[6] == ("compass", 9, 0, 7)
     assert len(rows) == 3 * 2 * 6
-
-
-# experiments/models/two_nests.py
 
 
 def test_shares_of_two_nests_by_hand(script):
@@ -90,9 +81,6 @@ def test_shares_of_two_nests_by_hand(script):
     assert (x, y) == (40, 1.25 / 3)
 
 
-# experiments/models/recovery.py
-
-
 def test_times_to_recover_by_hand(script):
     found = script("models/recovery", SHARES=(0.0, 0.5), REMOVAL=100, TICKS=300)
     given = {
@@ -105,9 +93,6 @@ def test_times_to_recover_by_hand(script):
     expected = [(0.0, 0), (0.0, 0), (0.0, 0), (0.5, 0), (0.5, 200), (0.5, 150)]
     assert table(results[1], "share removed", "ticks to recover") == expected
     assert results[0][-1] == {"removed": 0.5, "seed": 2, "tick": 250, "ants": 95}
-
-
-# experiments/models/misreading.py
 
 
 @pytest.mark.parametrize(
@@ -133,9 +118,6 @@ def test_ants_that_misread_all_cells_hardly_deliver(script):
     never, always = (found["deliveries"](found["FORAGING"], rate, [0, 1, 2]) for rate in (0.0, 1.0))
     assert never.min() > 100
     assert always.max() < 0.02 * never.min()
-
-
-# experiments/models/double_bridge.py
 
 
 def test_shares_of_crossings_by_hand(script):
@@ -182,9 +164,6 @@ def test_sides_of_equal_branches_do_not_matter_and_a_closed_branch_does(script):
     assert np.array_equal(closed, [0, 0])
 
 
-# experiments/models/division_of_labour.py
-
-
 def test_shares_of_foragers_by_hand(script):
     found = script("models/division_of_labour", DEMANDS=(0.5,), TICKS=200, ANTS=3)
     # (seeds, times, ants): the ant with the threshold 1 always forages, that with 9 never.
@@ -199,34 +178,6 @@ def test_shares_of_foragers_by_hand(script):
     }
     rows = table(results[0], "tick", "foragers")
     assert rows == [(50, 1 / 3), (100, 2 / 3), (150, 2 / 3), (200, 1 / 3)]
-
-
-@pytest.mark.slow
-def test_the_share_of_foragers_is_demand_by_relief_whatever_the_thresholds(script):
-    """The closed form of Bonabeau et al. (1996): of thresholds of ratio 8, a third is active."""
-    # Three ants, each in the only cell between the queen and a food, deliver equally often.
-    grid = World((3, 3, 3), CENTRE).grid
-    cells = {tuple(cell) for cell in grid.cells(np.flatnonzero(grid.exists)).tolist()}
-    foods = [(2, 0, 0), (0, 2, 0), (0, 0, 2)]
-    rock = sorted(cells - {CENTRE, *RING[::2], *foods})
-    corridors = World((3, 3, 3), CENTRE, foods=foods, obstacles=rock)
-    worlds = SimpleNamespace(open_world=lambda seed, ranges: corridors)
-    found = script("models/division_of_labour", worlds=worlds, ANTS=3, TICKS=10_000, STEP=1)
-    found["WORKERS"] = {
-        "major": Caste(share=1 / 3, threshold=Threshold("fixed", value=80)),
-        "minor": Caste(share=2 / 3, threshold=Threshold("fixed", value=10)),
-    }
-    forages, _, deliveries = found["foraging_over_time"](range(4), 100.0)
-    rate = deliveries.sum() / forages.sum()  # of a forager, per tick
-    demand = rate  # a third of what three foragers would deliver
-    forages, thresholds, _ = found["foraging_over_time"](range(4), demand)
-    assert np.allclose(forages[:, 1000:].mean(axis=(1, 2)), 1 / 3, atol=0.005)
-    majors = np.where(thresholds == 80, forages.mean(axis=1), np.nan)
-    minors = np.where(thresholds == 10, forages.mean(axis=1), np.nan)
-    assert (np.nanmean(minors, axis=1) > 3 * np.nanmean(majors, axis=1)).all()
-
-
-# experiments/goss.py
 
 
 def test_the_table_of_goss_by_hand(script, capsys):
@@ -249,8 +200,6 @@ def test_the_table_of_goss_by_hand(script, capsys):
     assert words.endswith("at most 25.0 percentage points.")
 
 
-# experiments/ant_system.py
-
 # A ring around obstacles, with two ways from the queen to food: 5 and 7 steps.
 WAYS = World((3, 3, 3), (2, 0, 0), foods=[(0, 2, 1)], obstacles=[CENTRE, *RING])
 
@@ -265,35 +214,6 @@ def test_the_row_of_ant_system_by_hand(script):
     assert row == ["4", "2/3", "2", "8.5", "4.5"]  # found in the iterations 2 and 1
     found["search"] = lambda *given, **settings: Search(3, best, mean, 0 * best)
     assert found["row"](settings, WAYS, "max_min") == ["3", "0/3", "-", "8.5", "4.5"]
-
-
-@pytest.mark.parametrize(
-    ("method", "rho", "again"),
-    [
-        # A lone ant starts with tau = 1 / L, for its tour L. Then the arcs of that tour have
-        # (1 - rho) / L + 1 / L, and the others (1 - rho) / L, so L does not matter.
-        ("ant_system", 0.5, (1.5 / 2, 1.5 / 2)),
-        ("ant_system", 0.1, (1.9 / 2.8, 1.9 / 2.8)),
-        ("ant_system", 1.0, (1, 1)),
-        # Tau starts at its upper bound, which the deposit restores. On the other arcs it falls to
-        # 1 - rho of it, but not below 1 / 0.05^(1/L) - 1 of it: 0.8206 for L = 5, 0.5341 for 7.
-        ("max_min", 0.02, (1 / 1.98, 1 / 1.98)),
-        ("max_min", 0.4, (1 / 1.8206, 1 / 1.6)),
-        ("max_min", 1.0, (1 / 1.8206, 1 / 1.5341)),
-    ],
-)
-def test_how_often_a_lone_ant_takes_the_same_way_again(method, rho, again):
-    n = 20_000
-    settings = {"ants": 1, "colonies": n, "evaporation": rho}
-    first, second = search(WAYS, method, iterations=2, **settings).best.T
-    assert set(first) == {5, 7}
-    assert abs((first == 5).mean() - 0.5) < 4 * np.sqrt(0.25 / n)
-    for length, share in zip((5, 7), again, strict=True):
-        same = (second == first)[first == length].mean()
-        assert abs(same - share) <= 4 * np.sqrt(share * (1 - share) / (n / 2))
-
-
-# experiments/fixed_rules.py
 
 
 def test_the_rules_and_rows_of_fixed_rules_by_hand(script):
@@ -344,9 +264,6 @@ def test_ants_with_fixed_rules_deliver_unless_they_explore(script):
     assert random.max() < 0.5 * fixed.min()
 
 
-# experiments/utility.py
-
-
 def test_the_row_of_utilities_by_hand(script):
     found = script("utility")
     first = Foraging(
@@ -362,9 +279,6 @@ def test_the_row_of_utilities_by_hand(script):
     assert found["row"]([first, second]) == expected
 
 
-# experiments/plugins/hysteretic.py
-
-
 @pytest.mark.parametrize(
     ("value", "reward", "largest", "error"),
     [(1, 2, 4, 3), (5, 0, 4, -0.6), (2, 0, 4, 0), (0, -1, 0, -0.2), (-3, -1, 0, 2)],
@@ -373,9 +287,6 @@ def test_td_errors_of_hysteretic_q_learning_by_hand(script, value, reward, large
     td_error = script("plugins/hysteretic")["td_error"]
     next_values = np.array([-9.0, largest, -9.0, -9.0, -9.0])
     assert td_error(value, reward, 0.5, next_values, 0, 0.3) == pytest.approx(error)
-
-
-# experiments/offline.py
 
 
 @pytest.mark.long

@@ -1,7 +1,5 @@
 """Each example runs, in a version of a few seconds, and says what its docstring promises."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

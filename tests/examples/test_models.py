@@ -1,7 +1,5 @@
 """The scripts in experiments/models: each writes a figure and a table, and shows what it says."""
 
-from __future__ import annotations
-
 import runpy
 import sys
 from typing import Any

@@ -1,7 +1,5 @@
 """The published models of ants: equal to plain Python, and to what was published."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import ant_system
@@ -33,9 +31,6 @@ WORLDS = {
     "bridge": double_bridge(5, 7),
     **{f"drawn {n}": random_world(n) for n in range(5) if with_food(random_world(n))},
 }
-
-
-# The double bridge of Goss and others.
 
 
 @pytest.mark.parametrize(
@@ -76,9 +71,6 @@ def test_classes_by_hand() -> None:
     assert class_shares(took, 1, 10).tolist() == [100, 0, 0, 0, 0]
 
 
-# Ant colony optimisation.
-
-
 @pytest.mark.parametrize("settings", [{}, {"alpha": 2}, {"max_steps": 12}], ids=str)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", WORLDS)
@@ -93,17 +85,6 @@ def test_every_tour_is_as_long_as_the_references(name: str, method: str, setting
             assert result.best[colony, i] == min(lengths, default=0)
             mean = np.mean(lengths) if lengths else np.nan
             assert np.array_equal(result.mean[colony, i], mean, equal_nan=True)
-
-
-def test_all_colonies_find_the_shorter_branch() -> None:
-    result = search(double_bridge(10, 15, mirrored=True), iterations=200, colonies=8)
-    assert result.shortest == 6 + 10 + 3  # to the junction, over the bridge, to the pile
-    assert (result.found > 0).all()
-    assert (result.best[:, -20:] < result.shortest + 5).all()
-    assert result.mean[:, -1].mean() < 0.8 * result.mean[:, 0].mean()
-
-
-# Ants that back up utilities.
 
 
 @pytest.mark.parametrize(
@@ -137,16 +118,6 @@ def test_every_utility_delivery_and_path_equals_the_reference(name: str, setting
             for cell, level in colony.utilities[goal].items():
                 levels[grid.index(cell)] = level
             assert np.array_equal(result.utilities[number, row], levels)
-
-
-def test_all_colonies_find_a_shortest_way() -> None:
-    result = forage(double_bridge(10, 15))
-    assert result.shortest == 2 * (6 + 10 + 3)
-    assert (result.found > 0).all()
-    assert (result.deliveries[:, 500:].sum(axis=1) > 60).all()
-
-
-# All three.
 
 
 def results(model: str, colonies: int = 6, **how: int) -> list[np.ndarray]:

@@ -1,7 +1,5 @@
 """The study of the double bridge: crossings, designs, and shares from known counts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from unittest.mock import Mock
 

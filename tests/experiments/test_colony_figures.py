@@ -1,7 +1,5 @@
 """The study's figures show the data."""
 
-from __future__ import annotations
-
 import colony_figures as figures
 import pytest
 from colony_findings import (

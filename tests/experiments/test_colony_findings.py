@@ -1,7 +1,5 @@
 """Every finding of the study, on made-up data where it is so and where it is not."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import pytest

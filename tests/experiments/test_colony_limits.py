@@ -1,7 +1,5 @@
 """What no colony can exceed: worked by hand, searched plainly, and reached."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """Every column that a study writes is declared, with its meaning, and every one declared occurs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from bridge_report import BRIDGES, LOADS, WINDOWS, Case, rows

@@ -1,7 +1,5 @@
 """The paper's comparison as a command: its files, held against the library."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from dataclasses import replace
@@ -203,7 +201,6 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
         (["--training.planning-steps", "2"], ["use --planning-steps"]),
         (["--task.delivery", "truncates"], ["--task.delivery"]),
         (["--seeds", "1000000"], ["--seeds", "1000000"]),
-        (["--learner", "sarsa"], ["--learner"]),  # no abbreviations: they change their meaning
         (["--world", "mars"], ["'mars'", "open", "paper"]),
         (["--world", "no_way.txt"], ["no_way.txt", "cannot reach any food"]),
         (["--world.seed", "0"], ["--world.seed", "'paper'", "open"]),

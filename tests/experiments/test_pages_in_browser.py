@@ -1,7 +1,5 @@
 """The pages in a real browser: sort, filter, open, play, print."""
 
-from __future__ import annotations
-
 import pytest
 from browser import Page, printed, shares
 from finished_pages import colony_html, comparison_html, results

@@ -1,7 +1,5 @@
 """The rows of baselines.csv."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Every claim of the paper, on data where it is true and on data where it is false."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Figures show the data: what is on their axes, not only that files appear."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

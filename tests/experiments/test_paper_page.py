@@ -1,7 +1,5 @@
 """The page of the comparison: its numbers are those of the tables, and it asks for nothing."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from html import escape, unescape

@@ -1,7 +1,5 @@
 """What the claims read from a comparison."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from paper.comparison import Q_LEARNING, SARSA

@@ -1,7 +1,5 @@
 """The report as text."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Pictures of learning, and policy sheets."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from pathlib import Path
@@ -12,19 +10,19 @@ import numpy as np
 import pytest
 from command_lines import ROOT, assert_one_sentence, call_script
 from learning import Checkpoint, Lessons, learning_frames, noted_checkpoints
-from named_states import parse_state
 from PIL import Image
 from policy_sheet import clarity, policy_sheet, usual_spread
 
 from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
-from taichi_ants.rendering import Episode, save_animation, text
+from taichi_ants.rendering import Episode, text
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
 from taichi_ants.task import Task, observations
-from taichi_ants.task.constants import PICK_UP, RIGHT
-from taichi_ants.task.states import REACHABLE_STATES
+from taichi_ants.task.constants import N_STATES, PICK_UP, RIGHT
+from taichi_ants.task.states import REACHABLE_STATES, state_name
 from taichi_ants.worlds import paper
 
+STATES = [state_name(index) for index in range(N_STATES)]
 CONFIG = TrainingConfig("sarsa", 0.01, 0.9, 0.5, 0.995)
 
 
@@ -83,21 +81,6 @@ def test_a_stage_that_has_ended_stays() -> None:
     assert not (halves[-1][1 - ended] == halves[last][1 - ended]).all()
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (64, 64)])
-def test_all_stages_fit(size, tmp_path) -> None:
-    checkpoints = Lessons(paper(), CONFIG, 3).checkpoints(0, (0, 1, 2, 3))
-    save_animation(tmp_path / "a.gif", learning_frames(checkpoints, size), 10)
-    with Image.open(tmp_path / "a.gif") as image:
-        assert image.size == size
-        picture = np.asarray(image.convert("RGB")).astype(int)
-    # The columns and the rows of worlds, told by their queens; there is one in the legend too.
-    letters = round(min(size[0] / 60, size[1] / 26))
-    picture = picture[: size[1] - round(2.6 * letters) * (letters >= text.SMALLEST)]
-    purple = (picture[..., 0] - picture[..., 1] > 90) & (picture[..., 2] - picture[..., 1] > 90)
-    groups = [(np.diff(np.flatnonzero(purple.any(axis=axis))) > 8).sum() + 1 for axis in (0, 1)]
-    assert groups == ([4, 1] if size == (1280, 720) else [2, 2])
-
-
 FIVE = observations.get("five_cells")
 
 
@@ -121,9 +104,9 @@ def test_the_usual_spread() -> None:
     """Worked by hand: the mean over states that can occur and whose values differ."""
     table = random_policy()
     assert usual_spread(table, Task().sees) == 0.0
-    table[parse_state("foraging E E E")] = (0.0, 4.0, 3.0, -1.0, 0.0)
-    table[parse_state("foraging E F E")] = (2.0, 2.0, 2.0, 3.0, 2.0)
-    table[parse_state("foraging F F F")] = 7.0
+    table[STATES.index("foraging E E E")] = (0.0, 4.0, 3.0, -1.0, 0.0)
+    table[STATES.index("foraging E F E")] = (2.0, 2.0, 2.0, 3.0, 2.0)
+    table[STATES.index("foraging F F F")] = 7.0
     assert usual_spread(table, Task().sees) == pytest.approx((5 + 1) / 2)
     unreachable = next(index for index in range(128) if index not in REACHABLE_STATES)
     table[unreachable] = (100.0, 0.0, 0.0, 0.0, 0.0)
@@ -145,7 +128,7 @@ def sheet_of_all_known() -> np.ndarray:
 def changed_place(name: int | str) -> list[int]:
     """Left, right, top and bottom of what differs where the best action of a state does."""
     table = all_known()
-    table[parse_state(name) if isinstance(name, str) else name] = (1.0, 0.0, 0.0, 0.0, 0.0)
+    table[STATES.index(name) if isinstance(name, str) else name] = (1.0, 0.0, 0.0, 0.0, 0.0)
     rows, columns = np.nonzero((policy_sheet(table) != sheet_of_all_known()).any(axis=2))
     return [columns.min(), columns.max(), rows.min(), rows.max()]
 
@@ -167,13 +150,13 @@ def test_a_state_has_its_place(monkeypatch) -> None:
 
 def test_the_bar_of_a_state_is_as_long_as_its_choice_is_clear() -> None:
     table = random_policy()
-    table[parse_state("foraging E E E")] = (0.0, 4.0, 3.0, -1.0, 0.0)
+    table[STATES.index("foraging E E E")] = (0.0, 4.0, 3.0, -1.0, 0.0)
     assert 15 <= coloured(policy_sheet(table), CHOSEN).sum(axis=1).max() < 40  # a fifth of 112
 
 
 def test_text_on_a_sheet_says_what_it_shows(lines) -> None:
     table = random_policy()
-    table[parse_state("foraging E F E"), PICK_UP] = 1.0
+    table[STATES.index("foraging E F E"), PICK_UP] = 1.0
     policy_sheet(table, "a title")
     assert lines[0] == "a title"
     assert "1 of 64 states learned" in lines
@@ -195,14 +178,11 @@ def test_the_sheet_of_an_observation_of_more_cells(lines) -> None:
         policy_sheet(random_policy(), task=Task(observation="five_cells"))
 
 
-# The command lines.
-
-
 @pytest.mark.slow
 def test_learning_and_a_sheet_from_the_command_line(tmp_path: Path, capsys) -> None:
     place = tmp_path / "a.gif"
     arguments = ["--seed", 5, "--checkpoints", 0, 2, "--max-steps", 9, "--size", "300x200"]
-    arguments += ["--task.observation", "ants_seen", "--training.learner", "dyna_q"]
+    arguments += ["--training.learner", "q_learning"]
     status, out, err = call_script("learning", [*arguments, "--out", place], capsys)
     assert (status, err) == (0, "")
     assert out.endswith("a.gif: seed 5, before learning, after 2 episodes\n")

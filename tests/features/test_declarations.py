@@ -99,41 +99,30 @@ OWN = {
     "noise": {"slip", "slip_below", "misread_below"},
     "life": {"ages", "ant_ages"},
 }
-# By reason, the files that use some of these names nevertheless.
+# Files that use some of these names nevertheless.
 EXCEPT = {
-    "a caste has a line for numbers of other features": {
-        "features/castes.py": {"Threshold", "temperature"},
-    },
-    "cues of castes are static in the engine, with the pheromone that carriers follow": {
-        "task/model.py": {"carriers_follow"},
-        "task/task.py": {"carriers_follow", "pheromones_laid"},
-    },
-    "the laying of fields is static in both engines": {
-        "engines/colony/kernels.py": {"deposited_when"},
-        "engines/colony/stepping.py": {"counts_without_food"},
-        "engines/colony/steps.py": {"OCCASIONS", "counts_without_food", "deposited_when"},
-        "engines/colony/trail.py": {"Occasion", "deposited_when"},
-        "reference/actions.py": {"deposited_when"},
-    },
-    "rules of choice are functions of one file in kernels, and the engine looks them up there": {
-        "task/rules/policy.py": {"deneubourg", "softmax", "temperature"},
-        "features/rule.py": {"deneubourg", "softmax"},  # the names that rules of yours cannot have
-    },
-    "deliveries by caste are counted in the phases of the engine": {
-        "engines/colony/episodes.py": {"caste_deliveries"},
-        "engines/colony/life.py": {"caste_deliveries"},
-    },
-    "snapshots of worlds without a colony have kinds of food, too": {
-        "records.py": {"ant_foods"},
-        "rendering/rasteriser.py": {"ant_foods"},
-        "viewer/recorder.py": {"ant_foods"},
-    },
-    "food that is moved keeps its kind and gets a source of it": {
-        "reference/interventions.py": {"kind_of"},
-    },
-    "rules are tried in drawn tasks with fields": {
-        "testing.py": {"OCCASIONS", "deposited_when"},
-    },
+    # A caste has a line for numbers of other features, and its cues are static in the engine.
+    "features/castes.py": {"Threshold", "temperature"},
+    "task/model.py": {"carriers_follow"},
+    "task/task.py": {"carriers_follow", "pheromones_laid"},
+    # The laying of fields is static in both engines.
+    "engines/colony/kernels.py": {"deposited_when"},
+    "engines/colony/stepping.py": {"counts_without_food"},
+    "engines/colony/steps.py": {"OCCASIONS", "counts_without_food", "deposited_when"},
+    "engines/colony/trail.py": {"Occasion", "deposited_when"},
+    "reference/actions.py": {"deposited_when"},
+    # Rules of choice are functions of one file in kernels, where the engine looks them up.
+    "task/rules/policy.py": {"deneubourg", "softmax", "temperature"},
+    "features/rule.py": {"deneubourg", "softmax"},  # the names that rules of yours cannot have
+    # Deliveries by caste are counted in the phases of the engine.
+    "engines/colony/episodes.py": {"caste_deliveries"},
+    "engines/colony/life.py": {"caste_deliveries"},
+    # Snapshots of worlds without a colony have kinds of food, too.
+    "records.py": {"ant_foods"},
+    "rendering/rasteriser.py": {"ant_foods"},
+    "viewer/recorder.py": {"ant_foods"},
+    "reference/interventions.py": {"kind_of"},  # food that is moved keeps its kind
+    "testing.py": {"OCCASIONS", "deposited_when"},  # rules are tried in drawn tasks with fields
 }
 
 
@@ -142,9 +131,8 @@ def test_only_its_own_file_names_what_a_feature_declares(group):
     own = {f"features/{group}.py", f"reference/features/{group}.py"} | LISTS
     for path in sorted(PACKAGE.rglob("*.py")):
         name = path.relative_to(PACKAGE).as_posix()
-        excepted = {word for files in EXCEPT.values() for word in files.get(name, ())}
         if name not in own or name in ("task/task.py",):
-            assert identifiers(path) & OWN[group] == excepted & OWN[group], name
+            assert identifiers(path) & OWN[group] == EXCEPT.get(name, set()) & OWN[group], name
 
 
 def test_the_state_of_a_colony_names_no_feature():

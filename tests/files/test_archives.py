@@ -1,7 +1,5 @@
 """Writing and reading archives of arrays."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable
 from pathlib import Path
@@ -58,8 +56,6 @@ def write_npy(path: Path) -> None:
         (lambda path: None, "no such file"),
         (Path.mkdir, "is a directory"),
         (lambda path: path.write_bytes(b""), "damaged, or not"),
-        (lambda path: path.write_bytes(b"text"), "damaged, or not"),
-        (lambda path: path.write_bytes(b"PK\x03\x04" + bytes(100)), "damaged, or not"),
         (write_npy, "damaged, or not"),
     ],
 )

@@ -1,7 +1,5 @@
 """Damaged files of every format: a sentence, or what was written; never anything else."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource
@@ -35,17 +33,11 @@ training.discount = [0.8, 0.9]
 
 
 class SmallFile(NamedTuple):
-    """A file, and a function that returns its content in a comparable form.
-
-    Attributes:
-        path: The file.
-        read: Returns the content of `path`.
-        checked: Whether the reader detects every change of the file.
-    """
+    """A file, and a function that returns its content in a comparable form."""
 
     path: Path
     read: Callable[[Path], Any]
-    checked: bool = True
+    checked: bool = True  # whether the reader detects every change of the file
 
     def outcome(self) -> Any:
         """Return the content of the file or the error, which must be a single short line."""

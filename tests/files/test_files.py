@@ -1,7 +1,5 @@
 """Writing files whole or not at all."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import os
@@ -18,9 +16,6 @@ from taichi_ants.errors import AntsError
 
 def names(folder: Path) -> list[str]:
     return sorted(entry.name for entry in folder.iterdir())
-
-
-# write_atomically.
 
 
 def test_a_file_is_written_and_replaced(tmp_path: Path) -> None:
@@ -84,9 +79,6 @@ def test_a_new_file_has_the_permissions_of_any_new_file(tmp_path: Path) -> None:
     assert modes[0] == modes[1]
 
 
-# check_writable_file.
-
-
 @pytest.mark.parametrize("name", ["old", "new", "new/folder/file", "link", "loop"])
 def test_a_file_that_can_be_written_is_let_be(tmp_path: Path, name: str) -> None:
     (tmp_path / "old").write_text("old")
@@ -135,9 +127,6 @@ def test_a_disk_that_is_full_is_told_before_the_work(tmp_path, monkeypatch) -> N
         files.check_writable_file(tmp_path / "new")
 
 
-# Text, JSON and CSV.
-
-
 def test_text_is_utf_8_with_its_own_line_ends(tmp_path: Path) -> None:
     files.write_text(tmp_path / "a.txt", "é\nb\r\n")
     assert (tmp_path / "a.txt").read_bytes() == b"\xc3\xa9\nb\r\n"
@@ -177,9 +166,6 @@ def test_csv_reads_back(tmp_path: Path) -> None:
     assert [float(row["b"]) for row in read] == [0.1 + 0.2, 1e-300, float(np.float32(0.1)), 2]
 
 
-# Reading.
-
-
 def test_text_is_read_with_any_line_ends(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_bytes("é\r\nb\rc\n".encode())
     assert files.read_text(tmp_path / "a.txt") == "é\nb\nc\n"
@@ -206,9 +192,3 @@ def test_text_that_is_none_or_too_long_is_refused(
 def test_a_name_that_no_file_has_is_refused(path: str) -> None:
     with pytest.raises(AntsError, match="cannot read"):
         files.read_text(path)
-
-
-def test_csv_refuses_a_key_that_is_no_column(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="extra"):
-        files.write_csv(tmp_path / "a.csv", [{"a": 1, "extra": 2}], ["a"])
-    assert names(tmp_path) == []

@@ -1,7 +1,5 @@
 """The models of golden hashes: colonies, trainings and protocols, from generators of the tests."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 from collections.abc import Iterator
@@ -187,10 +185,10 @@ def random_trainings(learner: str, n: int, noisy: bool) -> Iterator[tuple[str, A
 _MEASURES = ("deliveries", "living", "carriers")
 
 
-def random_events(drawn: RandomColony) -> list[protocol.Event]:
+def random_events(drawn: RandomColony) -> list[protocol.ProtocolEvent]:
     """Return a protocol of four events, which the worlds may still not allow."""
     rng, world, task = np.random.default_rng([drawn.seed % 2**32, 21]), drawn.world, drawn.task
-    events: list[protocol.Event] = []
+    events: list[protocol.ProtocolEvent] = []
     while len(events) < 4:
         kind = ("at", "every", "when")[rng.integers(3)]
         when: dict[str, Any] = {"tick": int(rng.integers(30))}

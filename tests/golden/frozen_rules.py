@@ -1,7 +1,5 @@
 """Rules for golden hashes: those of the tests, and two that other tests do not see."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Iterator
 from contextlib import contextmanager

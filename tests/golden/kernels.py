@@ -6,8 +6,6 @@ them, and with them results and speed. Where kernels change, record the names an
 and let the golden hashes show that results stay. This takes 20 s of processor time.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

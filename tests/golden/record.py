@@ -10,8 +10,6 @@ the same hashes. Values are hashed in a fixed order and as fixed types, without 
 columns and files. Where these are renamed, the lists below name them anew, and the hashes stay.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import hashlib

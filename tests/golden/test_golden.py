@@ -1,7 +1,5 @@
 """Results, kernels and the physics number are those recorded; see record.py and kernels.py."""
 
-from __future__ import annotations
-
 import kernels
 import pytest
 import record

@@ -74,10 +74,7 @@ def test_cells_beyond_the_array_are_refused() -> None:
     with pytest.raises(AntsError, match=r"\(9, 0, 0\).*\(3, 3, 1\)"):
         grid.index([(0, 0, 0), (9, 0, 0)])
     for index in (-1, grid.size, 1.0):
-        with pytest.raises(
-            AntsError,
-            match=r"^index .*; (all must lie between 0 and 24|it must be an array)",
-        ):
+        with pytest.raises(AntsError, match=r"^index .*; (all must lie betw|it must be an array)"):
             grid.cells([index])
 
 

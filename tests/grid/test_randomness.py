@@ -35,10 +35,7 @@ def test_arrays_give_what_numbers_give(seed: int) -> None:
     states = stream_state(seed, 3, numbers)
     assert states.dtype == np.uint64
     assert states.tolist() == [stream_state(seed, 3, n) for n in range(5)]
-    assert stream_state([seed, 8], 3, 1).tolist() == [
-        stream_state(seed, 3, 1),
-        stream_state(8, 3, 1),
-    ]
+    assert stream_state([seed, 8], 3, 1).tolist() == [stream_state(s, 3, 1) for s in (seed, 8)]
 
 
 def test_seeds_count_modulo_two_to_the_64() -> None:

@@ -23,7 +23,7 @@ function visited({ scene, changes, ticks }) {
   const frame = Object.fromEntries(["cells", "before", "headings", "looks"].map((name) => [name, [...engine[name].slice(0, engine.ants)]]));
   return {
     link, hash: engine.hash(), again: again.hash(), grown: memory !== engine.wasm.memory.buffer, ...frame,
-    counts: [engine.returns, engine.deliveries, engine.moves, engine.blocked],
+    counts: [0, 1, 2, 3].map((k) => engine.wasm.count(k)), // returns, deliveries, moves, blocked
     ground: [...engine.ground], levels: [...engine.levels],
   };
 }

@@ -142,7 +142,7 @@ def test_nothing_is_wider_than_a_phone_and_worlds_run(opened):
     assert tab.locator(".result.wrong").count() == 0
     for number in range(1, 7):
         tab.click(f"nav a >> nth={number}")
-        assert tab.inner_text("article:visible h1").startswith(f"Lesson {number}")
+        tab.wait_for_selector(f"article:visible h1:has-text('Lesson {number}')")
         assert tab.evaluate("document.documentElement.scrollWidth") == 390
         for figure in tab.locator(f"[id='{number}'] figure").all():
             figure.locator("canvas").scroll_into_view_if_needed()

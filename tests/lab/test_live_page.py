@@ -5,20 +5,14 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
+from browser import WORLD, world_of
 
 from taichi_ants import lab
 
 FILE = Path(__file__).parents[2] / "docs" / "live.html"
 VISIT = "AQAPVUAeZIQHAQrYBAECwwII_hAeAB4ABTYAHgUWABYABS4AHgUWACYAByEJ3gwHBARkABy2BwAsBA"
 TICK = 433  # a wall and a larger number of ants before it
-WORLD = """() => {
-  const { history } = viewer, moment = history.length - 1, { frames } = history;
-  const { ground, trail } = history.worldAt(moment), { cells, poses, tick } = frames[moment];
-  const loaded = poses.reduce((sum, pose) => sum + (pose >> 3), 0);
-  return [tick, [...cells], loaded, [...ground], [...trail]];
-}"""
 
 
 def until(tab, script):
@@ -39,13 +33,7 @@ def test_a_visit_can_be_looked_back_at_continued_and_saved(browser, tmp_path):
     tab.goto(f"{FILE.as_uri()}#{VISIT};{TICK};0")
     until(tab, f"() => window.viewer?.history.frames.at(-1).ticks === {TICK}")
     colony = lab.played(*lab.decoded(VISIT), TICK)
-    tick, cells, loaded, ground, trail = tab.evaluate(WORLD)
-    snapshot = colony.snapshot()
-    order = np.argsort(snapshot.ant_numbers)
-    assert (tick, loaded) == (TICK, int(snapshot.ant_carries.sum()))
-    assert cells == snapshot.ant_cells[order].tolist()
-    assert ground == snapshot.ground.tolist()
-    assert trail == snapshot.trail.tolist()
+    assert tab.evaluate(WORLD) == world_of(colony)
     # Each tick before can be seen, with what the ants did.
     tab.keyboard.press("Home")
     until(tab, "() => viewer.player.moment === 0")

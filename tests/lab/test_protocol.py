@@ -134,13 +134,7 @@ def served():
     return both
 
 
-@pytest.mark.parametrize(
-    ("rules", "learner"),
-    [
-        *((15, 0), (7, 1), (0, 2)),
-        *(pytest.param(*one, marks=pytest.mark.slow) for one in ((3, 0), (6, 1))),
-    ],
-)
+@pytest.mark.parametrize(("rules", "learner"), [(15, 0), (7, 1), (0, 2)])
 def test_server_and_worker_send_the_same_frames_and_messages(rules, learner, served):
     """Byte for byte; after an undo, points of curves depend on the time of the replay."""
     python, worker = served(rules=rules, learner=learner)

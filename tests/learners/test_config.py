@@ -9,8 +9,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from refusals import refused
 
-from taichi_ants import AntsError, TrainingConfig, learners
+from taichi_ants import TrainingConfig, learners
 
 GOOD = {
     **{"learner": "dyna_q", "learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3},
@@ -43,9 +44,7 @@ def test_rates_fall_by_their_factors_down_to_their_least():
 )
 def test_hyperparameters_are_those_of_the_learner(learner, name, value, says):
     config = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99, hyperparameters={name: value})
-    with pytest.raises(AntsError) as caught:
-        learners.registry.with_hyperparameters(config)
-    assert says in str(caught.value)
+    refused(says, learners.registry.with_hyperparameters, config)
 
 
 def test_numbers_of_any_kind_are_stored_as_plain_ones():

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Page
+from browser import WORLD, Page, world_of
 from rooms import CHOSEN, Guest, running
 
 from taichi_ants import Colony, load_policy
@@ -18,14 +18,6 @@ from taichi_ants.live.choices import Choices
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 pytestmark = pytest.mark.browser
-
-WORLD = """() => {
-  const { history } = viewer, moment = history.length - 1, frame = history.frames[moment];
-  const { ground, trail } = history.worldAt(moment);
-  return { ground: [...ground], trail: [...trail], cells: [...frame.cells].sort((a, b) => a - b),
-           loaded: frame.poses.reduce((sum, pose) => sum + (pose >> 3 & 1), 0),
-           tick: frame.tick, deliveries: frame.deliveries };
-}"""
 
 
 @pytest.fixture(scope="module")
@@ -55,29 +47,15 @@ def wait(page: Page, script: str) -> None:
     page.tab.wait_for_function(script)
 
 
-def world_of(room) -> dict:
-    """What `WORLD` is in the engine."""
-    colony = room.session.colony
-    snapshot = colony.snapshot()
-    return {
-        "ground": snapshot.ground.tolist(),
-        "trail": snapshot.trail.tolist(),
-        "cells": sorted(snapshot.ant_cells.tolist()),
-        "loaded": int(snapshot.ant_carries.sum()),
-        "tick": colony.ticks,
-        "deliveries": int(colony.outcome().deliveries[0, 0]),
-    }
-
-
 def assert_same(page: Page, room) -> None:
     """What the page has is what the engine has, once time stands still there too."""
     while room.playing:
         time.sleep(0.01)
     for _ in range(100):
-        if page.read(WORLD) == world_of(room):
+        if page.read(WORLD) == world_of(room.session.colony):
             break
         time.sleep(0.1)  # what has changed is on its way
-    assert page.read(WORLD) == world_of(room)
+    assert page.read(WORLD) == world_of(room.session.colony)
 
 
 def edits(room, n: int) -> list[dict]:
@@ -374,7 +352,8 @@ def test_every_control_is_reached_by_keyboard_and_has_a_name(page):
     for control in (
         *("world-name", "task", "policy", "ants", "episode", "seed", "begin", "restart"),
         *("set-epsilon", "set-ants", "next-episode", "session", "load", "page", "gif", "policy"),
-        *("colony", "quit", "look", "rock", "queen", "play", "speed"),
+        *("colony", "quit", "look", "rock", "queen", "play", "speed", "help-button", "world"),
+        *("zoom-in", "zoom-out", "fit", "forward", "time"),
     ):
         assert control in reached
     del reached["BODY"]

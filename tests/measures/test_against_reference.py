@@ -1,7 +1,5 @@
 """Measures of colonies equal those of the reference, which computes them in plain Python."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from plain_measures import MEASURES, measured

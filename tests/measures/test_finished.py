@@ -1,7 +1,5 @@
 """Measures of finished runs, by hand: those of lone ants, and of the evaluation of a colony."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

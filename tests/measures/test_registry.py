@@ -1,7 +1,5 @@
 """Registered measures: names, parts, arguments, and messages for wrong ones."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -97,17 +95,3 @@ def test_wrong_values_are_refused(function, message):
 def test_what_a_measure_reads_is_counts_or_runs():
     with pytest.raises(AntsError, match="of is 'activity'; it must be one of counts, run"):
         measures.register("mine", len, of="activity")
-
-
-def test_the_shortest_path_goes_around_obstacles():
-    """Hand-counted: five cells in a row, then the same with a detour, then with a wall."""
-    row = worlds.World((6, 1, 1), (0, 0, 0), foods=[(5, 0, 0), (4, 0, 0)])
-    assert measures.shortest_path(row) == 3  # food 4 steps away: 1 to pick up, 2 moves, 1 to give
-    near = worlds.World((3, 3, 1), (0, 0, 0), foods=[(1, 0, 0)])
-    assert measures.shortest_path(near) == 1
-    open_way = worlds.World((4, 3, 1), (0, 0, 0), foods=[(3, 0, 0)])
-    detour = worlds.World((4, 3, 1), (0, 0, 0), foods=[(3, 0, 0)], obstacles=[(1, 0, 0), (2, 0, 0)])
-    assert measures.shortest_path(open_way) == 2
-    assert measures.shortest_path(detour) == 3
-    closed = worlds.World((4, 1, 1), (0, 0, 0), foods=[(3, 0, 0)], obstacles=[(1, 0, 0)])
-    assert np.isnan(measures.shortest_path(closed))

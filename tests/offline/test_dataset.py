@@ -1,7 +1,5 @@
 """Data sets: files, parts, and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

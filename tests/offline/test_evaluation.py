@@ -1,7 +1,5 @@
 """Off-policy evaluation equals the reference, and is right where it promises to be."""
 
-from __future__ import annotations
-
 import numpy as np
 import plain_offline as plain
 import pytest

@@ -1,7 +1,5 @@
 """Offline learners equal the reference, and do what their methods promise."""
 
-from __future__ import annotations
-
 import numpy as np
 import plain_offline as plain
 import pytest

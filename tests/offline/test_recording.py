@@ -1,7 +1,5 @@
 """What is recorded is what the reference does, with the probability of each action."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from plain_runs import run_episode, train_with_tables

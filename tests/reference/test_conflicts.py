@@ -8,6 +8,7 @@ from __future__ import annotations
 import pytest
 from colonies import act, begun, foods_of
 
+from taichi_ants.grid.randomness import GAMMA, mix
 from taichi_ants.reference.actions import Intent, winners
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import neighbour
@@ -15,20 +16,11 @@ from taichi_ants.reference.random_stream import RandomStream
 from taichi_ants.task.constants import FORWARD, PICK_UP
 from taichi_ants.worlds import World
 
-MASK = 2**64 - 1
-
-
-def mix(z):
-    z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9 & MASK
-    z = (z ^ z >> 27) * 0x94D049BB133111EB & MASK
-    return z ^ z >> 31
-
 
 def key(world: World, cell, tick):
     """The rule once more: a hash of the number of the ant's cell and the tick."""
-    gamma = 0x9E3779B97F4A7C15
-    place = int(world.grid.index(cell))
-    return mix((mix(place + gamma & MASK) ^ tick) + gamma & MASK)
+    inner = int(mix((int(world.grid.index(cell)) + GAMMA) % 2**64))
+    return int(mix(((inner ^ tick) + GAMMA) % 2**64))
 
 
 @pytest.mark.parametrize("n", range(2, 7))

@@ -12,8 +12,7 @@ OPEN = World((9, 9, 1), (8, 8, 0), foods=[(4, 3, 0)], ants=[((2, 3, 0), 0)])
 
 
 def begun_with(world=OPEN, **fields):
-    colony = begun(world, pheromone=Pheromone("none"), fields=fields)
-    return colony
+    return begun(world, pheromone=Pheromone("none"), fields=fields)
 
 
 def levels(colony, name):

@@ -83,6 +83,28 @@ def test_all_that_can_meet_stays_apart(theme) -> None:
     assert not close(of["halo"], samples)
 
 
+def contrasts(ones: list[int], others: list[int]) -> np.ndarray:
+    """The contrast of WCAG 2 of each colour with each other."""
+    parts = [colours.channels(np.array(words)) / 255 for words in (ones, others)]
+    linear = [np.where(p <= 0.04045, p / 12.92, ((p + 0.055) / 1.055) ** 2.4) for p in parts]
+    light, other = (one @ (0.2126, 0.7152, 0.0722) + 0.05 for one in linear)
+    ratio = light[:, None] / other
+    return np.maximum(ratio, 1 / ratio)
+
+
+@pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
+def test_text_can_be_read_and_ants_stand_out(theme) -> None:
+    of = theme_of(theme)
+    for ink in ("ink", "faint", "chosen", "good", "bad"):
+        assert contrasts(of[ink], of["card"]) > 4.5, ink
+    # Where the trail comes near the colour of ants, the edge around them sets them apart.
+    assert (contrasts(of["ant"] + of["halo"], of["empty"] + of["trail"]).max(axis=0) > 3).all()
+    # Food in small cells is a dot with a ring.
+    assert (contrasts(of["food"] + of["food-floor"], of["trail"]).max(axis=0) > 1.75).all()
+    assert contrasts(of["food"], of["food-floor"]) > 2.9
+    assert (np.diff(contrasts(of["trail"], of["page"])[:, 0]) > 0).all()
+
+
 def steps_of(samples: list[int]) -> list[int]:
     """Colours of a ramp with four steps between its samples."""
     parts = colours.channels(np.array(samples)).T

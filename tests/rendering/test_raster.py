@@ -188,7 +188,6 @@ def test_fields_have_scales_of_their_own() -> None:
     [
         pytest.param({}, ["250", "250"], marks=pytest.mark.slow),
         ({"diffusion": 0.5}, ["20", "2000"]),
-        pytest.param({"deposit": "add", "cap": 5000}, ["20", "2000"], marks=pytest.mark.slow),
     ],
 )
 def test_the_scale_fits_fields_whose_levels_rules_do_not_tell(rules, told, monkeypatch) -> None:

@@ -1,7 +1,5 @@
 """ODD descriptions: tables of all settings that have an effect in a study, and of no others."""
 
-from __future__ import annotations
-
 import json
 import re
 from contextlib import suppress

@@ -56,7 +56,6 @@ MODELS = {
         (2, 2, False), (3, False, [("B", "a"), ("trail", "compass")]), {}),
 }  # fmt: skip
 NAMES = ("learner", "sharing", "traffic", "dense", "fields")
-SLOW = ("labour of users",)
 
 
 def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[ProtocolEvent]] | None:
@@ -110,7 +109,9 @@ def steps_compared(
 @pytest.mark.parametrize(
     ("name", "ant_steps"),
     [
-        *(pytest.param(name, 6_000, marks=pytest.mark.slow) for name in SLOW),
+        ("rules of users", 1_500),
+        pytest.param("labour of users", 6_000, marks=pytest.mark.slow),
+        pytest.param("rewards of users", 6_000, marks=pytest.mark.slow),
         # Two million in all, in ten minutes.
         *(pytest.param(name, 340_000, marks=pytest.mark.long) for name in MODELS),
         pytest.param("softmax", 2_500, marks=pytest.mark.optimised),

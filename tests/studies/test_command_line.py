@@ -1,14 +1,11 @@
 """What the command lines share: arguments, exits, plugins, progress."""
 
-from __future__ import annotations
-
 import signal
 import sys
 from pathlib import Path
 
 import pytest
 
-from taichi_ants import worlds
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
@@ -69,11 +66,6 @@ def test_help_shows_the_defaults_that_say_something(parser, monkeypatch):
     assert "--count COUNT how many" in lines
     assert "--rates X [X ...] how fast (default: 0.1 2.0)" in lines
     assert "--loud whether" in lines
-
-
-def test_help_names_all_worlds():
-    *names, path = command_line.WORLDS.split("; ")[0].split(", ")
-    assert (sorted(names), path) == (list(worlds.names()), "or a map file")
 
 
 def fail_with(error):

@@ -1,10 +1,10 @@
 """Blocks by executors of all kinds: the same results, whatever happens to the workers."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import re
+import subprocess
+import sys
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_lines import promptly
+from command_lines import environment, promptly
 
 from taichi_ants import PHYSICS, AntsError, TrainingConfig
 from taichi_ants.studies import executors, plugins
@@ -121,6 +121,31 @@ def test_the_calls_of_a_dead_worker_are_lost_and_no_others(tmp_path):
     while Path(f"/proc/{pid}").exists():
         assert time.monotonic() - began < promptly()
         time.sleep(0.05)
+
+
+ONE_WORKER = """
+import numpy as np
+from taichi_ants import runtime
+from taichi_ants.rendering.rasteriser import draw_marks, marks
+from taichi_ants.studies.executors import Workers
+
+with Workers(1) as workers:
+    frame, mark = np.zeros((9, 9, 3), np.uint8), marks((4, 4), 3, 0, 0)
+    workers.submit(draw_marks, frame, mark).result()
+print(len([*runtime.cache_folder().glob("*.tic")]))
+"""
+
+
+@pytest.mark.parametrize("threads", ["1", "2"])  # with one, the worker is a fork on Linux
+def test_a_worker_saves_its_kernels(threads, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", ONE_WORKER],
+        env=environment(tmp_path, OPENBLAS_NUM_THREADS=threads),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == "1\n"
 
 
 def test_workers_can_be_threads_of_this_process(tmp_path, monkeypatch):

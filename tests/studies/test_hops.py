@@ -1,7 +1,5 @@
 """The functions that a value passes through, as the page on the architecture lists them."""
 
-from __future__ import annotations
-
 import re
 import traceback
 

@@ -1,7 +1,5 @@
 """Signals that end a command, whatever it is doing."""
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess

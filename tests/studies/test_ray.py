@@ -1,7 +1,5 @@
 """Blocks by Ray: the bytes of a plain run, whatever happens to workers and machines."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

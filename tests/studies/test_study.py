@@ -1,19 +1,16 @@
 """Studies: wanted minus present, in blocks of any size, by stages, in shards."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import fields, make_dataclass, replace
 
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, TrainingConfig, evaluate, train
+from taichi_ants import AntsError, TrainingConfig, evaluate, train
 from taichi_ants.protocol import At, Every
 from taichi_ants.studies import points as kinds_of_points
 from taichi_ants.studies.folder import provenance, source
 from taichi_ants.studies.points import (
-    EVALUATION_SEEDS,
     ColonyPoint,
     Drawn,
     FixedPolicy,
@@ -135,29 +132,6 @@ LIVELY = Task(delivery="truncates", evaporation_in_training=True, life=Life(regr
 WORLDS = tuple(open_world(seed, (12, 12, 12)) for seed in (3, 5))
 DRAWN = Drawn.by("open", ranges=(12, 12, 12))
 ALONE = ColonyPoint(DRAWN, LIVELY, SARSA, episodes=2, ticks=60, rollouts=2)
-
-
-@pytest.mark.slow
-def test_a_study_of_colonies_is_learning_and_evaluation(tmp_path):
-    joint = replace(ALONE, ants=4, after=ALONE)
-    own = replace(ALONE, ants=4, sharing="independent", start="spread")
-    study = colonies((joint, own))
-    outcomes = outcomes_of(study, tmp_path)
-    (table,) = Store(tmp_path).read(study.first.keys, (3, 5), ("q_values",))["q_values"]
-    first = Colony(WORLDS, LIVELY, SARSA, (3, 5))
-    first.run(2, 60)
-    assert np.array_equal(table, first.q_values)
-    calm = replace(SARSA, epsilon=SARSA.min_epsilon, epsilon_decay=1.0)
-    others = [seed + EVALUATION_SEEDS for seed in (3, 5)]
-    for point, more in ((joint, {"q_values": first.q_values}), (own, {})):
-        options = {"ants": 4, "start": point.start}
-        learning = Colony(WORLDS, LIVELY, SARSA, (3, 5), **options, sharing=point.sharing, **more)
-        learning.run(2, 60)
-        table = learning.q_values
-        colony = Colony(WORLDS, LIVELY, calm, others, **options, sharing="frozen", q_values=table)
-        episodes = colony.run(2, 60)
-        for name in ("deliveries", "first_delivery", "moves", "blocked", "returns"):
-            assert np.array_equal(outcomes[point][name], getattr(episodes, name).T)
 
 
 @pytest.mark.parametrize("shards", [1, 2, 3, 7, 30])

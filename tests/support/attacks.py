@@ -1,7 +1,5 @@
 """Small session files that would need much time or memory if their size were not checked."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -13,23 +11,21 @@ from taichi_ants.files import archives
 from taichi_ants.live.session import Session
 
 
-def _edits(facts: dict[str, Any]) -> str:
-    return json.dumps({**facts, "edits": [[0, {"episode": {}}]] * 20_000, "changes": [0]})
+def _edits(facts: dict[str, Any], edit: dict[str, Any], times: int) -> str:
+    return json.dumps({**facts, "edits": [[0, edit]] * times, "changes": [0]})
 
 
 def _setup(facts: dict[str, Any], **changes: Any) -> str:
     return json.dumps({**facts, "setup": {**facts["setup"], **changes}})
 
 
-def _cells(facts: dict[str, Any]) -> str:
-    edit = {"trail": {"level": 1, "cells": list(range(100, 300))}}
-    return json.dumps({**facts, "edits": [[0, edit]] * 3000, "changes": [0]})
+_TRAIL = {"trail": {"level": 1, "cells": list(range(100, 300))}}
 
 
 # Name: a function that changes the facts of a session, and a part of the error message.
 ATTACKS: dict[str, tuple[Callable[[dict[str, Any]], str], str]] = {
-    "20 000 edits": (_edits, "20000 edits"),
-    "edits of many cells": (_cells, "600000 cells in all edits"),
+    "20 000 edits": (lambda facts: _edits(facts, {"episode": {}}, 20_000), "20000 edits"),
+    "edits of many cells": (lambda facts: _edits(facts, _TRAIL, 3000), "600000 cells in all edits"),
     "4 000 000 lists": (lambda _: "[" + "[]," * 4_000_000 + "[]]", "5000000 are allowed"),
     "deep lists": (lambda _: "[" * 60_000 + "]" * 60_000, "does not contain a session"),
     "a large map": (

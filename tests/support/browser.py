@@ -1,7 +1,5 @@
 """A headless Chromium for tests of pages."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -14,7 +12,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from taichi_ants import Colony
+
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+
+# The world of the last moment of a page.
+WORLD = """() => {
+  const { history } = viewer, moment = history.length - 1, frame = history.frames[moment];
+  const { ground, trail } = history.worldAt(moment);
+  return { ground: [...ground], trail: [...trail], cells: [...frame.cells].sort((a, b) => a - b),
+           loaded: frame.poses.reduce((sum, pose) => sum + (pose >> 3 & 1), 0),
+           tick: frame.tick, deliveries: frame.deliveries };
+}"""
 
 
 @contextmanager
@@ -110,3 +119,16 @@ class Page:
     def close(self) -> None:
         self.context.close()
         assert not self.faults
+
+
+def world_of(colony: Colony) -> dict[str, Any]:
+    """Return what `WORLD` is in the engine."""
+    snapshot = colony.snapshot()
+    return {
+        "ground": snapshot.ground.tolist(),
+        "trail": snapshot.trail.tolist(),
+        "cells": sorted(snapshot.ant_cells.tolist()),
+        "loaded": int(snapshot.ant_carries.sum()),
+        "tick": colony.ticks,
+        "deliveries": int(colony.outcome().deliveries[0, 0]),
+    }

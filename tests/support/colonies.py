@@ -1,7 +1,5 @@
 """Colonies for tests, made from a map, with actions that the test chooses."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np

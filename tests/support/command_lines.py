@@ -1,7 +1,5 @@
 """Commands of the package and of `experiments/`, run for tests in a new process or in this one."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import importlib

@@ -1,7 +1,5 @@
 """Bootstrap intervals with fewer resamples, for tests that do not need exact intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

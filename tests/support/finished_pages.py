@@ -1,7 +1,5 @@
 """Pages of synthetic studies, for tests of their text and in a browser."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 
@@ -36,7 +34,7 @@ class Results(NamedTuple):
     audit: Audit
 
     @classmethod
-    def of(cls, comparison: Comparison) -> Results:
+    def of(cls, comparison: Comparison):
         """Return the results of a comparison."""
         return cls(comparison, table2(comparison, summarise(comparison)), assess(comparison))
 
@@ -52,7 +50,7 @@ def results() -> Results:
 def comparison_html() -> str:
     """Return the page of `results`."""
     recording = record_trace(rollout(worlds.paper(), trail_follower()))
-    sheet = Picture("a <policy>", np.full((20, 30, 3), 200, np.uint8))
+    sheet = Picture.of("a <policy>", np.full((20, 30, 3), 200, np.uint8))
     comparison, lines, audit = results()
     return comparison_page(
         *(comparison, BASELINES, lines, audit),

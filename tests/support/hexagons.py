@@ -1,7 +1,5 @@
 """Geometry of arrays of cells."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from taichi_ants.grid.constants import HEADING_STEPS

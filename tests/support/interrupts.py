@@ -1,7 +1,5 @@
 """Ctrl-C at its likeliest moment: Python raises it right after the launch during which it came."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -4,17 +4,12 @@ They are the double bridge of Goss, Aron, Deneubourg and Pasteels, Naturwissensc
 ant colony optimisation; and ants that back up utilities. Each model simulates one colony.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BRIDGE, STREAM_FORAGER, STREAM_TOUR
 from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
-
-if TYPE_CHECKING:
-    from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import World
 
 NEST, FOOD = 0, 1
 Arc = tuple[Cell, int]  # a cell and the heading of the step from it

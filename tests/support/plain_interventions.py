@@ -1,7 +1,5 @@
 """Interventions: changes of a colony between two ticks, and protocols, which say when."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any

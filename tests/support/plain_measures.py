@@ -1,7 +1,5 @@
 """The built-in measures of `taichi_ants.measures` in plain Python, from the state of a colony."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable

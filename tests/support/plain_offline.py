@@ -4,8 +4,6 @@ Data are a list of episodes. An episode is a list of steps (state, action, rewar
 terminated) of Python numbers.
 """
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 

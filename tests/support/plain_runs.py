@@ -1,7 +1,5 @@
 """Runs of one ant in the reference, in the form that tests need."""
 
-from __future__ import annotations
-
 import copy
 
 from taichi_ants import TrainingConfig

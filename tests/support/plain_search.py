@@ -1,7 +1,5 @@
 """Plain searches that test the exact bounds, in a separate simulator."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from taichi_ants.analysis.bounds import ExpectedEpisode

@@ -1,11 +1,9 @@
 """Playback of recordings in Python: the world at each moment, computed from the frames."""
 
-from __future__ import annotations
-
 import json
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,32 +24,22 @@ def unpack(types: Mapping[str, str], frame: bytes) -> dict[str, np.ndarray]:
 
 @dataclass
 class Played:
-    """The world at a moment, and the last actions of ants.
+    """The world at a moment, and the last actions of ants."""
 
-    Attributes:
-        clock: See `taichi_ants.viewer.frames.CLOCK`.
-        numbers, cells, headings, loaded, states: The living ants, by ascending number.
-        actions, events, td_errors: The last step of the ants of the previous moment.
-        ground, trail: The contents and trail levels of all cells.
-        values: Changed action values, by entry.
-        nests: The nests of the living ants.
-        fields: The levels of all pheromones in order, the trail first.
-    """
-
-    clock: list[float]
-    numbers: np.ndarray
+    clock: list[float]  # see `taichi_ants.viewer.frames.CLOCK`
+    numbers: np.ndarray  # of the living ants, ascending, as what follows
     cells: np.ndarray
     headings: np.ndarray
     loaded: np.ndarray
     states: np.ndarray
-    actions: np.ndarray
+    actions: np.ndarray  # of the ants of the previous moment
     events: np.ndarray
     td_errors: np.ndarray
     ground: np.ndarray
     trail: np.ndarray
-    values: dict[int, float] = field(default_factory=dict)
-    nests: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
-    fields: list[np.ndarray] = field(default_factory=list)
+    values: dict[int, float]  # that have changed, by entry
+    nests: np.ndarray
+    fields: list[np.ndarray]  # the levels of all pheromones in order, the trail first
 
     def row(self, state: int, n_states: int, owner: int = 0) -> np.ndarray:
         """Return the action values of a state, float32 (5,)."""

@@ -1,7 +1,5 @@
 """Random castes, response thresholds and division of labour for random colonies."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

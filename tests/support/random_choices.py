@@ -1,7 +1,5 @@
 """Random rules of choice, and random noise."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from taichi_ants.task import Choice, Noise

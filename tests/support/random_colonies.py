@@ -4,8 +4,6 @@ Golden hashes depend on the order and the ranges of these draws, so keep both. D
 a new random stream.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

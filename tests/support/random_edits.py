@@ -1,18 +1,11 @@
-"""Random edits, and their application to the plain reference."""
+"""Random edits."""
 
-from __future__ import annotations
-
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from plain_interventions import Interventions as PlainInterventions
 
-from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.live.choices import sliders
-from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.task.constants import EMPTY
 
 KINDS = (
@@ -50,27 +43,3 @@ def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[
         name, _, setting = path.partition(".")
         return {name: {setting: new} if setting else new}
     return {kind: {}}
-
-
-def apply_to_both(
-    edit: dict[str, Any], interventions: Interventions, plain: PlainInterventions
-) -> PlainInterventions:
-    """Apply an edit to a colony and to its twin; raises AntsError if the world forbids it.
-
-    An episode begins in the world that the interventions have made, with new interventions.
-    """
-    change: Any = language.from_dict(edit)
-    interventions.apply(change)
-    if "episode" in edit:
-        colony = plain.colony
-        colony.end_episode()
-        colony.n_ants = interventions.ants
-        for number in range(len(colony.streams), colony.n_ants):
-            state = stream_state(colony.seed, STREAM_ANT, number)
-            colony.streams.append(RandomStream(state))
-        colony.begin_episode(interventions.world())
-        return PlainInterventions(colony)
-    if getattr(change, "cells", None):
-        change = replace(change, cells=interventions.colony.grid.cells(change.cells).tolist())
-    plain.apply(change)
-    return plain

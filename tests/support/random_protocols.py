@@ -1,7 +1,5 @@
 """Random protocols for small worlds."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

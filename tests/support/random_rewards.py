@@ -1,7 +1,5 @@
 """Random tables of rewards."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from taichi_ants.task.constants import MOST_REWARD

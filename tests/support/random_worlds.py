@@ -1,7 +1,5 @@
 """Small random worlds with food, rocks, trails of all strengths, regions, and at most one ant."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A running server of the live page, and test clients in the place of pages."""
 
-from __future__ import annotations
-
 import json
 import threading
 from collections.abc import Iterator
@@ -116,7 +114,7 @@ class Guest:
     def close(self) -> None:
         self.socket.close()
 
-    def __enter__(self) -> Guest:
+    def __enter__(self):
         self.until("whole")
         return self
 

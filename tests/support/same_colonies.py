@@ -1,7 +1,5 @@
 """Comparison of a colony with its plain reference."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

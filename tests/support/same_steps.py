@@ -1,10 +1,10 @@
-"""Comparison of what steps and resets of environments return."""
-
-from __future__ import annotations
+"""Actions of tests of environments, and comparison of what steps and resets return."""
 
 from typing import Any
 
 import numpy as np
+
+from taichi_ants.task.constants import PICK_UP
 
 
 def assert_same(ours: Any, theirs: Any, where: str = "") -> None:
@@ -20,3 +20,10 @@ def assert_same(ours: Any, theirs: Any, where: str = "") -> None:
     else:
         assert getattr(ours, "dtype", None) == getattr(theirs, "dtype", None), where
         np.testing.assert_array_equal(ours, theirs, err_msg=where, strict=True)
+
+
+def likely(rng: np.random.Generator, masks: np.ndarray) -> np.ndarray:
+    """Return mostly actions that can succeed, pick-up and give above all; else any."""
+    worth = rng.random(masks.shape) + 2 * masks * (rng.random(masks.shape[:-1]) < 0.8)[..., None]
+    worth[..., PICK_UP:] += masks[..., PICK_UP:]
+    return worth.argmax(axis=-1)

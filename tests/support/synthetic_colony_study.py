@@ -1,7 +1,5 @@
 """Synthetic studies of colonies: given deliveries in each condition, with noise over seeds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import product
 

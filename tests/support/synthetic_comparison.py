@@ -3,8 +3,6 @@
 Each configuration has explicit numbers. By default all claims of the paper are clearly true.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -34,30 +32,26 @@ ROLLOUTS = tuple(f"greedy_{name}" for name in EPISODES)
 
 @dataclass(frozen=True)
 class Truth:
-    """The means around which the runs of one configuration vary.
+    """The means around which the runs of one configuration vary."""
 
-    Attributes:
-        early_return, late_return: Return in the first `EARLY` episodes and after them.
-        swing: Added to the return of odd episodes, subtracted in even ones.
-        early_steps, late_steps: Lengths of episodes.
-        steps_swing: The same as `swing`, for steps.
-        deliveries: Probability of a delivery in an episode.
-        greedy_return, greedy_steps, greedy_deliveries: Results of each greedy rollout; without a
-            delivery, the ant walks the trail.
-        greedy_varies: Whether rollouts of one run differ.
-    """
-
-    early_return: float
+    early_return: float  # in the first `EARLY` episodes
     late_return: float
-    swing: float
+    swing: float  # added to the return of odd episodes, subtracted in even ones
     early_steps: float
     late_steps: float
     steps_swing: float
-    deliveries: float = 1.0
-    greedy_return: int = 45
+    deliveries: float = 1.0  # probability in an episode
+    greedy_return: int = 45  # of each rollout, as what follows; without a delivery, the ant walks
     greedy_steps: int = 35
     greedy_deliveries: int = 1
-    greedy_varies: bool = False
+    greedy_varies: bool = False  # whether rollouts of one run differ
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Made(Comparison):
+    """A comparison with its episodes."""
+
+    arrays: dict[str, np.ndarray]
 
 
 Edit = Callable[[Variant, GridPoint, Truth], Truth]
@@ -167,13 +161,6 @@ def remeasured(made: Made) -> Made:
     edges = spans(made.episodes)[:-1]
     each = {sums(n): np.add.reduceat(made.arrays[n], edges, axis=2, dtype=int) for n in EPISODES}
     return replace(made, curves=curves_of(made, each))
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Made(Comparison):
-    """A comparison with its episodes."""
-
-    arrays: dict[str, np.ndarray]
 
 
 def _runs(

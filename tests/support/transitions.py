@@ -1,7 +1,5 @@
 """Transitions with explicit values, for tests of learners."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from taichi_ants.reference.ants import Transition

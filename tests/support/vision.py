@@ -1,7 +1,5 @@
 """How far apart colours look: CIEDE2000, also for people with a colour vision deficiency."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

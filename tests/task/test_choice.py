@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, train, worlds
+from taichi_ants import Colony, Task, TrainingConfig, World, worlds
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import action_probabilities
 from taichi_ants.task import Choice, Field, Noise, Pheromone
@@ -103,32 +103,6 @@ def test_misread_cells():
     for seen in codes:
         assert_counts(seen, [0.7, 0.1, 0.1, 0.1])
     assert_counts((codes > 0).sum(axis=0), [0.343, 0.441, 0.189, 0.027])
-
-
-CELLS, SOFTLY, FROZEN = Task(choice="deneubourg"), Task(choice="softmax"), {"sharing": "frozen"}
-EXPECTED = TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0)
-REFUSED = [
-    (
-        lambda: Colony(worlds.paper(), CELLS, PLAIN),
-        "so ants choose without action values, but sharing is 'shared'",
-    ),
-    (
-        lambda: Colony(worlds.paper(), CELLS, PLAIN, q_values=GREEDY_VALUES, **FROZEN),
-        'set sharing to "frozen" and training to None, and leave out q_values',
-    ),
-    (
-        lambda: train(worlds.paper(), EXPECTED, 0, 1, task=SOFTLY),
-        "learner 'expected_sarsa' takes the mean over epsilon-greedy actions",
-    ),
-    (lambda: Colony(worlds.paper(), SOFTLY, EXPECTED), "learner 'expected_sarsa'"),
-]
-
-
-@pytest.mark.parametrize(("make", "says"), REFUSED, ids=[says[:40] for _, says in REFUSED])
-def test_refusals_name_the_setting(make, says):
-    with pytest.raises(AntsError) as caught:
-        make()
-    assert says in str(caught.value)
 
 
 def test_worlds_that_begin_again_do_not_misread_twice():

@@ -8,10 +8,13 @@ import json
 import numpy as np
 import pytest
 from random_rewards import random_rewards
+from refusals import refused
 
-from taichi_ants import At
+from taichi_ants import At, Colony, TrainingConfig, train, worlds
 from taichi_ants.errors import AntsError
 from taichi_ants.features.cues import CUES
+from taichi_ants.interventions import from_dict
+from taichi_ants.protocol import Every, When
 from taichi_ants.task import (
     Choice,
     Field,
@@ -152,8 +155,68 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("make", "says"), REFUSED, ids=[says[:40] for _, says in REFUSED])
-def test_wrong_tasks_are_refused_in_one_sentence(make, says):
-    with pytest.raises(AntsError) as caught:
-        make()
-    assert says in str(caught.value)
+CELLWISE, SOFTLY, FROZEN = (
+    Task(choice="deneubourg"),
+    Task(choice="softmax"),
+    {"sharing": "frozen"},
+)
+LEARNS = TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0)
+TABLE = np.zeros((128, 5), np.float32)
+COLONIES = [
+    (
+        lambda: paper_colony(CELLWISE, LEARNS),
+        "so ants choose without action values, but sharing",
+    ),
+    (
+        lambda: paper_colony(CELLWISE, LEARNS, q_values=TABLE, **FROZEN),
+        'set sharing to "frozen" and training to None, and leave out q_values',
+    ),
+    (
+        lambda: train(worlds.paper(), LEARNS, 0, 1, task=SOFTLY),
+        "learner 'expected_sarsa' takes the mean over epsilon-greedy actions",
+    ),
+    (lambda: paper_colony(SOFTLY, LEARNS), "learner 'expected_sarsa'"),
+    (
+        lambda: paper_colony(castes()(), **FROZEN),
+        "`task.castes` has a, which a colony with given actions does not support",
+    ),
+    (
+        lambda: paper_colony(castes(policy="random")(), LEARNS, sharing="independent"),
+        "`task.castes.a.policy` is 'random', but sharing is \"independent\"",
+    ),
+    (
+        lambda: paper_colony(castes(ants=3)(), LEARNS, ants=5),
+        "the castes have 3 ants in nest 0, but 5 ants start there",
+    ),
+]
+
+
+def paper_colony(task, training=None, **options):
+    Colony(worlds.paper(), task, training, **options).begin_episode()
+
+
+EVENTS = [
+    (lambda: At(1), "`at` has no intervention; give one or more of remove_ants"),
+    (lambda: At(-1, trail=0), "`at.tick` is -1; it must be between"),
+    (lambda: At(3, remove_ants=1.5), "`remove_ants.share` is 1.5; it must be between 0 and 1"),
+    (lambda: At(3, remove_ants={"shar": 1}), "`remove_ants.shar` is not a setting; choose share"),
+    (lambda: At(3, remove_ants={"number": 1, "share": 0.5}), "has number and share; give one of"),
+    (lambda: At(3, clear=[[1, 2]]), "`clear.cells` is [[1, 2]]; it must be a list of cells, each"),
+    (lambda: At(3, move=[[1, 2, 0]]), "`move.cells` is ((1, 2, 0),); it must be the cell to"),
+    (lambda: At(3, task="following"), "`at.task` is 'following'; it must be a table of settings"),
+    (lambda: Every(5, stop=2, trail=0), "`every.stop` is 2, before the first event"),
+    (lambda: When("living", trail=0), "`when` needs a bound"),
+    (lambda: from_dict({"explode": 1}), "the name of an intervention is 'explode'"),
+    (lambda: At(3, trail="gate"), "`at.trail` is 'gate'; it must be a level, which is a whole"),
+    (lambda: At(3, trail=2.5), "`at.trail` is 2.5; it must be a level"),
+    (lambda: At(3, ants=0.5), "`at.ants` is 0.5; it must be a whole number of ants, or a table of"),
+]
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    REFUSED + COLONIES + EVENTS,
+    ids=[says[:40] for _, says in REFUSED + COLONIES + EVENTS],
+)
+def test_what_is_refused(make, says):
+    refused(says, make)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -24,12 +26,8 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.interventions import Place
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.viewer import (
-    Recorder,
-    Recording,
-    record_colony,
-    record_trace,
-)
+from taichi_ants.task import Caste, Food, Labour, Threshold, foraging
+from taichi_ants.viewer import Recorder, Recording, page, record_colony, record_trace
 from taichi_ants.viewer.frames import types_of
 
 # Each entry needs its own kernels: learner, sharing, observation, dense, traffic.
@@ -40,6 +38,26 @@ KERNELS = [
     pytest.param("q_learning", "frozen", "queues", True, "following", marks=pytest.mark.slow),
 ]
 TICKS = 40
+CASTES = {
+    "nurse": Caste(share=0.4, threshold=Threshold("fixed", value=5)),
+    "scout": Caste(share=0.3, learning_rate=0.5),
+    "guide": Caste(policy="trail_follower"),
+}
+FOODS = {"seed": Food(deliver=90, regrowth=5), "sap": Food(deliver=40, loads=3), "egg": Food()}
+MANY = foraging().replace(
+    castes=CASTES,
+    foods=FOODS,
+    labour=Labour("thresholds", demand=1.0, relief=1, stop_probability=0.1),
+    life={"regrowth": None},
+)
+WORLD = World(
+    (9, 9, 9),
+    (2, 2, 0),
+    foods=[(5, 2, 0), (2, 5, 0), (3, 0, 0), (6, 6, 0), (0, 3, 0)],
+    food_kinds=[0, 1, 2, 0, 1],
+    other_queens=[(6, 3, 0)],
+)
+CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 1.0)
 
 
 @pytest.mark.parametrize(("learner", "sharing", "sees", "dense", "traffic"), KERNELS)
@@ -105,35 +123,57 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
             before = moment
 
 
-@pytest.mark.parametrize("sharing", ["shared", "independent"])
-def test_a_recording_of_several_nests(sharing):
-    """Frames have the nests of ants, the queens by nest, and the table of each nest."""
-    world = World((8, 8, 8), [(6, 0, 0), (0, 0, 0)], foods=[(3, 1, 0), (4, 1, 0)])
-    config = TrainingConfig("q_learning", 0.1, 0.9, 0.2, 1.0)
-    colony = Colony(world, None, config, 3, ants=12, sharing=sharing)
+def test_frames_have_nests_castes_kinds_of_food_and_rewards():
+    colony = Colony(WORLD, MANY, CONFIG, 4, ants=30, start="spread")
     colony.begin_episode()
-    recorder, queens = Recorder(colony), []
-    frames = [recorder.snapshot()]
-    for tick in range(30):
-        queens.append(colony.snapshot().queens.tolist())
-        if tick == 9:
+    recorder, kinds = Recorder(colony), np.zeros(colony.grid.size, np.uint8)
+    frames, seen = [recorder.snapshot()], set()
+    frame = unpack(recorder.types, frames[0])
+    queens = frame["queens"].tolist()
+    assert queens == colony.snapshot().queens.tolist()
+    for tick in range(150):
+        order = np.argsort(colony.numbers[0])
+        snapshot, numbers = colony.snapshot(), np.argsort(colony.snapshot().ant_numbers)
+        kinds[frame["kinds_at"]] = frame["kinds"]
+        assert np.array_equal(kinds, snapshot.food_kinds)
+        groups = frame["groups"]
+        assert (groups & 15 == colony.castes[0, order]).all()
+        assert (frame["marks"] == 255 * colony.idle[0, order]).all()
+        carried = snapshot.ant_foods[numbers]
+        assert (groups >> 4 == np.maximum(carried, 0)).all()
+        seen |= {("carried", kind) for kind in carried.tolist()}
+        frames.append(recorder.tick())
+        frame = unpack(recorder.types, frames[-1])
+        assert not len(frame["queens"])
+        idle = colony.actions[0, order] < 0
+        assert (frame["acts"] & 15 == np.where(idle, 15, colony.actions[0, order])).all()
+        assert (frame["rewards"] == colony.rewards[0, order]).all()
+        seen |= {("reward", value) for value in frame["rewards"].tolist()}
+        seen |= {("idle", one) for one in idle.tolist()}
+        if tick == 70:
+            (cell,) = colony.grid.cells(np.array([snapshot.ant_cells[0]])).tolist()
+            Interventions(colony).apply(Place("food", [cell], kind="egg"))
             Interventions(colony).apply(Place("queen", [[0, 6, 0]], nest=1))
             frames.append(recorder.snapshot())
-            queens.append(colony.snapshot().queens.tolist())
-        frames.append(recorder.tick())
-    sections = [unpack(recorder.types, frame) for frame in frames]
-    assert sections[0]["queens"].tolist() == queens[0]
-    assert sections[10]["queens"].tolist() == queens[10] != queens[0]
-    assert not any(len(one["queens"]) for n, one in enumerate(sections) if n not in (0, 10))
-    assert unpack(recorder.types, recorder.whole())["queens"].tolist() == queens[-1]
-    nests = colony.nests[0, np.argsort(colony.numbers[0])]
-    assert (sections[-1]["poses"] >> 4 == nests).all()
-    *_, last = played(Recording(recorder.header(), frames))
-    tables, n_states = colony.q_values[0], colony.task.n_states
-    for place, state in enumerate(last.states.tolist()):
-        owner = nests[place] if sharing == "shared" else last.numbers[place]
-        assert np.array_equal(last.row(state, n_states, int(owner)), tables[owner, state])
-    assert ["nests", "2"] in list(map(list, recorder.header()["about"]))
+            frame = unpack(recorder.types, frames[-1])
+            assert frame["queens"].tolist() == colony.snapshot().queens.tolist() != queens
+    assert {("carried", kind) for kind in (-1, 0, 1, 2)} <= seen
+    assert {("reward", 90.0), ("reward", 40.0), ("idle", True), ("idle", False)} <= seen
+    whole = unpack(recorder.types, recorder.whole())
+    found = np.zeros(colony.grid.size, np.uint8)
+    found[whole["kinds_at"]] = whole["kinds"]
+    assert np.array_equal(found, colony.snapshot().food_kinds)
+    header = recorder.header()
+    assert whole["queens"].tolist() == colony.snapshot().queens.tolist()
+    *_, last = played(Recording(header, frames))
+    order = np.argsort(colony.numbers[0])
+    assert np.array_equal(last.nests, colony.nests[0, order])
+    tables = colony.q_values[0].reshape(-1, MANY.n_states, 5)
+    for state, table in zip(last.states.tolist(), colony.tables_of_ants[0, order], strict=True):
+        assert np.array_equal(last.row(state, MANY.n_states, int(table)), tables[table, state])
+    assert ["nests", "2"] in list(map(list, header["about"]))
+    assert (header["castes"], header["foods"]) == ([*CASTES], [*FOODS])
+    assert header["marks"] == [{"words": "idle", "most": None}]
 
 
 @pytest.mark.parametrize("learner", ["sarsa", "double_q"])
@@ -221,3 +261,13 @@ def test_what_cannot_be_recorded_says_why():
     object.__setattr__(trace, "arguments", None)
     with pytest.raises(AntsError, match="does not contain its world and settings"):
         record_trace(trace)
+
+
+def test_notebooks_show_recordings():
+    title = 'An <ant> & its "trail"'
+    trace = rollout(worlds.paper(), trail_follower())
+    recording = record_trace(trace, title)
+    shown = recording._repr_html_()
+    assert shown.startswith("<iframe ")
+    assert html.unescape(re.search(r'title="([^"]*)"', shown)[1]) == title
+    assert html.unescape(re.search(r'srcdoc="([^"]*)"', shown)[1]) == page(recording)

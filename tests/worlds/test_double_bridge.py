@@ -71,14 +71,9 @@ def test_a_mirrored_bridge_is_the_mirror_image(short: int, long: int, aside: int
 def test_the_way_to_the_food_and_who_starts_where() -> None:
     world = double_bridge()
     assert world.reachable_foods().any()
-    around_food = min(
-        length
-        for cell, length in steps(
-            walkable(world) - set(listed_cells(world.foods)), (0, 0, 0)
-        ).items()
-        if any(neighbour(cell, heading) in listed_cells(world.foods) for heading in range(6))
-    )
-    assert around_food == 6 + 23 + 2  # to the junction, over the bridge, to the pile
+    length = steps(walkable(world), world.queen)
+    nearest = min(length[food] for food in listed_cells(world.foods))
+    assert nearest == 6 + 23 + 2 + 1  # to the junction, over the bridge, into the pile
     cells, _ = world.start(3, 90)
     assert world.distances()[cells].max() == 5  # all in the nest
     assert len(world.trails) == len(world.ants) == 0

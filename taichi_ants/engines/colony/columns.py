@@ -4,12 +4,15 @@ from collections.abc import Callable
 from typing import Any
 
 import taichi as ti
+from taichi.lang.impl import subscript
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, high_word, stream_of
 from taichi_ants.engines.colony.layout import Order
 from taichi_ants.grid.constants import STREAM_INDIVIDUAL
+from taichi_ants.kernel_functions import while_compiling
 
 _TEMPLATES = {"c", "v", "column", "cues", "field", "view", "row", "phase", "update"}
+_TEMPLATES |= {"what", "arguments"}
 
 
 def function(body: Callable[..., Any]) -> Callable[..., Any]:
@@ -23,15 +26,12 @@ def function(body: Callable[..., Any]) -> Callable[..., Any]:
     return ti.func(body)
 
 
-@function
+@while_compiling
 def chunks_of(c, v):
     """Return the number of chunks of each world in a launch."""
-    n = 1
-    if ti.static(v.by_ant):
-        n = c.places
-    elif ti.static(v.in_chunks):
-        n = c.orders[Order.CHUNKS]
-    return n
+    if v.by_ant:
+        return c.places
+    return subscript(None, c.orders, Order.CHUNKS) if v.in_chunks else 1
 
 
 @function
@@ -55,24 +55,25 @@ def put(column, ant, value):
 
 
 @function
+def add(v, column, index, n):
+    """Add n to an entry, which a single thread changes unless `v.by_ant`."""
+    if ti.static(v.by_ant):
+        if n != 0:
+            column[index] += n
+    else:  # without `+=`, which would be atomic and slower
+        column[index] = column[index] + n
+
+
+@function
 def individual(c, w, ant):
     """Return the number of an ant that never changes, from 0 to less than 1, f64."""
     stream = advance(stream_of(c.seeds[w], STREAM_INDIVIDUAL, ti.cast(c.number[ant], ti.u64)))
     return ti.cast(high_word(bits_of(stream)), ti.f64) / 4294967296.0
 
 
-@function
+@while_compiling
 def nest_of(c, v, ant):
-    nest = 0
-    if ti.static(v.n_nests > 1):
-        nest = trait(c.nest, ant)
-    return nest
-
-
-@function
-def own_map(c, v, w, ant):
-    """Return the place of an ant's cell in an array with a map for each nest."""
-    return (w * v.n_nests + nest_of(c, v, ant)) * c.size + c.cell[ant]
+    return trait(c.nest, ant) if v.n_nests > 1 else 0
 
 
 @function
@@ -81,10 +82,8 @@ def of_caste(c, ant, row):
     return c.castes[row, trait(c.caste, ant)]
 
 
-@function
+@while_compiling
 def group_of(c, v, ant):
     """Return the group of an ant in its world: those of its nest and caste, who share a table."""
-    group = nest_of(c, v, ant)
-    if ti.static(v.n_castes > 0):
-        group = group * v.n_castes + trait(c.caste, ant)
-    return group
+    nest = nest_of(c, v, ant)
+    return nest * v.n_castes + trait(c.caste, ant) if v.n_castes > 0 else nest

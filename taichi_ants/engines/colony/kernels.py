@@ -22,7 +22,7 @@ from taichi_ants.engines.colony.columns import chunks_of, function, share_of, tr
 from taichi_ants.engines.colony.layout import Order, WorldRow
 from taichi_ants.engines.colony.views import entries_of
 from taichi_ants.features import hooks_at
-from taichi_ants.kernel_functions import kernel_function, while_compiling
+from taichi_ants.kernel_functions import Named, kernel_function, while_compiling
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
@@ -167,9 +167,7 @@ def last_groups(v: Variant) -> Iterator[Group]:
 @function
 def do(phase, c, v, chunk):
     """Do a phase for a chunk, or for the world `chunk`, unless its episode has ended."""
-    w = chunk
-    if ti.static(phase.of != WORLD):
-        w = chunk // chunks_of(c, v)
+    w = chunk if ti.static(phase.of == WORLD) else chunk // chunks_of(c, v)
     if ti.static(phase.of == STATES):  # without updates if the episode has ended
         first, last = share_of(c, v, chunk, v.n_rows)
         phase.do(c, v, w, first, last)
@@ -189,13 +187,10 @@ def do(phase, c, v, chunk):
             phase.do(c, v, w, tick)
 
 
-@function
+@while_compiling
 def is_taken(c, v, ant):
     """Return whether an ant is in a slot; without vacant slots, always, while a kernel compiles."""
-    taken = True
-    if ti.static(v.slots_matter):
-        taken = trait(c.stage, ant) != layout.Stage.VACANT
-    return taken
+    return trait(c.stage, ant) != layout.Stage.VACANT if v.slots_matter else True
 
 
 # What all ants do between two ticks.
@@ -219,18 +214,18 @@ def once(v: Variant, name: str, arguments: Any) -> Callable[..., None]:
     return advance_colony
 
 
+@while_compiling
+def entries_in_world(of, c, v):
+    """Return the number of entries of each world, such as ants or cells, by the numbers `c`."""
+    if of in (STATES, SUMS):
+        return v.n_rows * c.places if of == SUMS else v.n_rows
+    return 1 if of == WORLD else c.n_slots if of == ANTS else c.size
+
+
 @function
 def do_one(phase, c, v, i):
     """Do a phase for entry i of what all worlds have, such as an ant or a cell; or for world i."""
-    w = i
-    if ti.static(phase.of == ANTS):
-        w = i // c.n_slots
-    elif ti.static(phase.of == CELLS):
-        w = i // c.size
-    elif ti.static(phase.of == STATES):
-        w = i // v.n_rows
-    elif ti.static(phase.of == SUMS):
-        w = i // (v.n_rows * c.places)
+    w = i // entries_in_world(phase.of, c, v)
     running, tick = c.worlds[WorldRow.RUNNING, w], c.worlds[WorldRow.TICKS, w]
     if ti.static(phase.of == STATES):
         phase.do(c, v, w, i - w * v.n_rows, i - w * v.n_rows + 1)
@@ -265,16 +260,9 @@ def by_ant(v: Variant, name: str, contents: memory.Contents, arguments: Any) -> 
     )
 
     @while_compiling
-    def lengths_of(numbers: Any) -> dict[str, Any]:
-        number = partial(memory.number_of, contents, numbers)
-        n_worlds = number("n_worlds")
-        return {
-            ANTS: n_worlds * number("n_slots"),
-            CELLS: n_worlds * number("size"),
-            STATES: n_worlds * v.n_rows,
-            SUMS: n_worlds * number("places") * v.n_rows,
-            WORLD: n_worlds,
-        }
+    def lengths_of(memories: Any) -> dict[str, Any]:
+        numbers = Named(partial(memory.number_of, contents, memories))
+        return {of: numbers.n_worlds * entries_in_world(of, numbers, v) for of, _ in loops}
 
     @ti.kernel
     def advance_colony(c: arguments):

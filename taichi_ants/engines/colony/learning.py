@@ -13,12 +13,14 @@ them atomically: whole numbers, whose order does not matter, as that of ants.
 """
 
 import taichi as ti
+from taichi.lang.impl import subscript
 
 from taichi_ants.arithmetic.random_bits import advance, draw_below
 from taichi_ants.engines.colony import columns, steps
 from taichi_ants.engines.colony.columns import chunks_of, function
 from taichi_ants.engines.colony.layout import TOUCHED_LINE, CasteRow, Stage, SumRow, Tally
 from taichi_ants.engines.colony.views import ant_view
+from taichi_ants.kernel_functions import while_compiling
 from taichi_ants.learners import model
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
 from taichi_ants.task.constants import BEST_AT, N_ACTIONS, ROW, Event
@@ -110,13 +112,10 @@ def observe_and_learn(c, v, w, chunk, ant, tick):
         columns.put(c.next_action, ant, next_action)
 
 
-@function
+@while_compiling
 def learns(c, v, ant):
     """Return whether an ant learns; without castes, always, while a kernel compiles."""
-    does = True
-    if ti.static(v.n_castes > 0):
-        does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0
-    return does
+    return columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0 if v.n_castes > 0 else True
 
 
 @function
@@ -156,13 +155,10 @@ def own_number(c, caste, row, default):
     return ti.select(value >= 0.0, ti.cast(value, ti.f32), default)
 
 
-@function
+@while_compiling
 def caste_of(c, v, ant):
     """Return the caste of an ant, 0 without castes."""
-    caste = 0
-    if ti.static(v.n_castes > 0):
-        caste = columns.trait(c.caste, ant)
-    return caste
+    return columns.trait(c.caste, ant) if v.n_castes > 0 else 0
 
 
 @function
@@ -222,13 +218,10 @@ def error_of(c, v, w, pair, reward, terminated, seen, next_action):
     return error
 
 
-@function
+@while_compiling
 def group_of_pair(v, pair):
     """Return the group of a pair, whose number is its place in the tables of all groups in turn."""
-    group = 0
-    if ti.static(v.n_groups > 1):
-        group = pair // v.n_numbers
-    return group
+    return pair // v.n_numbers if v.n_groups > 1 else 0
 
 
 @function
@@ -389,15 +382,12 @@ def join_atomically(c, v, w, chunk, row):
                     c.latest[entry] = 0
 
 
-@function
+@while_compiling
 def transition_of(c, v, entry):
     """Return the transition of the ant with the highest number that updates a pair."""
-    transition = 0
-    if ti.static(v.by_ant):
-        transition = ti.cast(c.latest[entry], ti.i32)
-    else:
-        transition = c.sums_of[SumRow.TRANSITION, entry]
-    return transition
+    if v.by_ant:
+        return ti.cast(subscript(None, c.latest, entry), ti.i32)
+    return subscript(None, c.sums_of, SumRow.TRANSITION, entry)
 
 
 @function

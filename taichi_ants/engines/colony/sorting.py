@@ -70,11 +70,8 @@ def count(c, v, chunk, first, last, high):
 @function
 def place(c, v, chunk, first, last, high):
     """Place the ants of a chunk by a digit, behind those with smaller ones or in earlier chunks."""
-    w, n_chunks, places = (
-        chunk // chunks_of(c, v),
-        chunks_of(c, v),
-        2 * _N_DIGITS * chunk + _N_DIGITS,
-    )
+    w, n_chunks = chunk // chunks_of(c, v), chunks_of(c, v)
+    places = 2 * _N_DIGITS * chunk + _N_DIGITS
     following = w * c.n_slots
     for digit in range(_N_DIGITS):
         for other in range(w * n_chunks, (w + 1) * n_chunks):

@@ -14,14 +14,14 @@ all ants act.
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import taichi as ti
+from taichi.lang.impl import subscript
 from taichi.math import popcnt
 
 from taichi_ants.arithmetic.random_bits import advance, bits_of, draw_below
 from taichi_ants.engines.colony import columns, layout, trail
-from taichi_ants.engines.colony.columns import function, nest_of, of_caste, put, trait
+from taichi_ants.engines.colony.columns import add, function, nest_of, of_caste, put, trait
 from taichi_ants.engines.colony.layout import ANT_GROUND, ANT_STANDS, TALLY_WIDTH, CasteRow, Tally
 from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
 from taichi_ants.engines.colony.views import ant_view, cell_view
@@ -36,12 +36,22 @@ from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, RIGHT, Ev
 from taichi_ants.task.rules import actions, conflicts, policy, vision
 
 
-@function
+@while_compiling
 def state_index_of(c, v, ant):
-    state = trait(c.paper_state, ant)
-    if ti.static(not v.sees_paper_state):
-        state = c.state[ant]
-    return state
+    return trait(c.paper_state, ant) if v.sees_paper_state else subscript(None, c.state, ant)
+
+
+@function
+def by_cues(c, v, ant, what, arguments):
+    """Return what(c, v, cues, *arguments), an i32, for the cues that the ant's caste follows."""
+    result = 0
+    if ti.static(len(v.cues) == 1):
+        result = what(c, v, ti.static(v.cues[0]), *arguments)
+    else:
+        for i in ti.static(range(len(v.cues))):
+            if of_caste(c, ant, CasteRow.CUES) == i:
+                result = what(c, v, ti.static(v.cues[i]), *arguments)
+    return result
 
 
 @function
@@ -87,42 +97,37 @@ def observe_with(c, v, cues, w, ant, carries, tick):
     return paper_state, v.encode(view)
 
 
+@while_compiling
+def cells_ahead(c, here, heading):
+    """Return the places of the cells left, forward and right of an ant."""
+    return [here + actions.step_towards(c.compass, heading, i) for i in (LEFT, FORWARD, RIGHT)]
+
+
 @function
 def see(c, v, cues, w, ant, tick):
     """Return the paper's state, without values that only other observations need."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
-    left = here + actions.step_towards(c.compass, heading, LEFT)
-    forward = here + actions.step_towards(c.compass, heading, FORWARD)
-    right = here + actions.step_towards(c.compass, heading, RIGHT)
+    cells = cells_ahead(c, here, heading)
     queen = own_queen(c, v, w, ant)
-    ground_left, ground_forward = looks_of(c, v, left, queen), looks_of(c, v, forward, queen)
-    ground_right = looks_of(c, v, right, queen)
+    grounds = [looks_of(c, v, cells[i], queen) for i in ti.static(range(3))]
     paper_state = 0
     if trait(c.carries, ant) == 1:
         if ti.static(cues.has_sense):
             nearer = vision.nearer_from(better_around(c, v, cues, w, ant), heading)
-            paper_state = vision.paper_state_carrying(
-                ground_left, ground_forward, ground_right, nearer
-            )
+            paper_state = vision.paper_state_carrying(*grounds, nearer)
         else:
-            homing = ti.static(v.field(c, cues.followed))
-            paper_state = vision.paper_state_homing(
-                *(homing.half, ground_left, ground_forward, ground_right),
-                level_in_view(c, homing, left, tick),
-                level_in_view(c, homing, forward, tick),
-                level_in_view(c, homing, right, tick),
-                strongest_of(c, homing, left, forward, right, tick),
-            )
+            paper_state = see_by_level(c, v.field(c, cues.followed), 1, grounds, cells, tick)
     else:
-        outbound = ti.static(v.field(c, cues.outbound))
-        paper_state = vision.paper_state_foraging(
-            *(cues.half, ground_left, ground_forward, ground_right),
-            level_in_view(c, outbound, left, tick),
-            level_in_view(c, outbound, forward, tick),
-            level_in_view(c, outbound, right, tick),
-            strongest_of(c, outbound, left, forward, right, tick),
-        )
+        paper_state = see_by_level(c, v.field(c, cues.outbound), 0, grounds, cells, tick)
     return paper_state
+
+
+@while_compiling
+def see_by_level(c, field, carries, grounds, cells, tick):
+    """Return the paper's state of an ant that follows a pheromone."""
+    levels = [level_in_view(c, field, cell, tick) for cell in cells]
+    strongest = strongest_of(c, field, *cells, tick)
+    return vision.paper_state_by_level(field.half, carries, *grounds, *levels, strongest)
 
 
 @function
@@ -151,14 +156,12 @@ def cue_level(c, v, cues, carries, index, tick):
 @function
 def strongest_cue(c, v, cues, carries, here, heading, tick):
     """Return the largest level that counts ahead, in the pheromone of `cue_level`."""
-    left = here + actions.step_towards(c.compass, heading, LEFT)
-    forward = here + actions.step_towards(c.compass, heading, FORWARD)
-    right = here + actions.step_towards(c.compass, heading, RIGHT)
+    cells = cells_ahead(c, here, heading)
     outbound = ti.static(v.field(c, cues.outbound))
-    level = ti.cast(strongest_of(c, outbound, left, forward, right, tick), v.level_type)
+    level = ti.cast(strongest_of(c, outbound, *cells, tick), v.level_type)
     if ti.static(not cues.has_sense):
         field = ti.static(v.field(c, cues.followed))
-        homing = ti.cast(strongest_of(c, field, left, forward, right, tick), v.level_type)
+        homing = ti.cast(strongest_of(c, field, *cells, tick), v.level_type)
         level = ti.select(carries == 1, homing, level)
     return level
 
@@ -194,12 +197,6 @@ def view_around(c, v, cues, w, ant, carries, tick):
     return view
 
 
-@while_compiling
-def set_entry(view: Any, name: str, level: Any) -> None:
-    """Set the level of the ant's own cell in a view, while a kernel compiles."""
-    getattr(view, f"own_{name}")._assign(level)
-
-
 @function
 def read_fields(c, v, view, k, index, standable, tick):
     """Set the levels of cell number k of a view in the pheromones that the observation reads."""
@@ -208,12 +205,11 @@ def read_fields(c, v, view, k, index, standable, tick):
         vision.entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
 
 
-@function
+@while_compiling
 def read_own_levels(c, v, view, here, tick):
     """Set the levels of the ant's own cell in the pheromones that the observation reads."""
-    for i in ti.static(range(len(v.reads))):
-        level = level_of(ti.static(v.field(c, v.reads[i])), here, tick)
-        set_entry(view, v.observation.reads[i], level)
+    for name, number in zip(v.observation.reads, v.reads, strict=True):
+        getattr(view, f"own_{name}")._assign(level_of(v.field(c, number), here, tick))
 
 
 @function
@@ -238,14 +234,13 @@ def holds_nestmate(c, v, ant, index):
     return holds
 
 
-@function
+@while_compiling
 def own_queen(c, v, w, ant):
     """Return the place of an ant's queen in `ground`; -1 with one nest, which needs none."""
-    queen = -1
-    if ti.static(v.n_nests > 1):
-        column = w * v.n_nests + nest_of(c, v, ant)
-        queen = w * c.size + c.nests[layout.NestRow.QUEEN_CELL, column]
-    return queen
+    if v.n_nests == 1:
+        return -1
+    column = w * v.n_nests + nest_of(c, v, ant)
+    return w * c.size + subscript(None, c.nests, layout.NestRow.QUEEN_CELL, column)
 
 
 @while_compiling
@@ -271,14 +266,8 @@ def draw_action(c, v, w, ant, state, paper_state, tick, random_state):
     """Return the ant's action in a state, by a random stream that was advanced for it."""
     action, bits = 0, bits_of(random_state)
     if ti.static(v.draw_by_cues):
-        if ti.static(len(v.cues) == 1):
-            cues = ti.static(v.cues[0])
-            action = v.draw_by_cues(c, v, cues, w, ant, state, paper_state, tick, bits)
-        else:
-            for i in ti.static(range(len(v.cues))):
-                if of_caste(c, ant, CasteRow.CUES) == i:
-                    cues = ti.static(v.cues[i])
-                    action = v.draw_by_cues(c, v, cues, w, ant, state, paper_state, tick, bits)
+        arguments = ti.static((w, ant, state, paper_state, tick, bits))
+        action = by_cues(c, v, ant, v.draw_by_cues, arguments)
     else:
         table = table_of(c, v, owner_of(c, v, w, ant))
         explore_below = explore_below_of(c, v, w, ant)
@@ -291,28 +280,19 @@ def draw_action(c, v, w, ant, state, paper_state, tick, random_state):
     return action
 
 
-@function
+@while_compiling
 def best_actions_of(c, v, table, state):
     """Return the `best_actions` of a state; they are stored unless ants have their own tables."""
-    best = 0
-    if ti.static(v.independent):
-        best = policy.best_actions(values_of(c.q, table, state))
-    else:
-        best = ti.cast(c.q[table + state * constants.ROW + constants.BEST_AT], ti.i32)
-    return best
+    if v.independent:
+        return policy.best_actions(values_of(c.q, table, state))
+    place = table + state * constants.ROW + constants.BEST_AT
+    return ti.cast(subscript(None, c.q, place), ti.i32)
 
 
 @function
 def own_reward(c, v, w, ant, paper_state, tick):
     """Return the reward of an ant by your own rule, i32; `paper_state` is the new one."""
-    reward = 0
-    if ti.static(len(v.cues) == 1):
-        reward = v.own_reward(c, v, ti.static(v.cues[0]), w, ant, paper_state, tick)
-    else:
-        for i in ti.static(range(len(v.cues))):
-            if of_caste(c, ant, CasteRow.CUES) == i:
-                reward = v.own_reward(c, v, ti.static(v.cues[i]), w, ant, paper_state, tick)
-    return reward
+    return by_cues(c, v, ant, v.own_reward, ti.static((w, ant, paper_state, tick)))
 
 
 @function
@@ -376,14 +356,9 @@ def draw_cell(c, v, cues, w, ant, state, paper_state, tick, bits):
     return v.choose_cell(carries, codes, opens, nears, weights, bits)
 
 
-@function
+@while_compiling
 def executed_by(c, v, ant):
-    action = 0
-    if ti.static(v.slips):
-        action = trait(c.executed, ant)
-    else:
-        action = trait(c.action, ant)
-    return action
+    return trait(c.executed if v.slips else c.action, ant)
 
 
 @function
@@ -474,14 +449,8 @@ def event_of(c, v, w, ant, tick):
     here = w * c.size + c.cell[ant]
     ahead = here + step_ahead(c, ant)
     if conflicts.had_ant(c, ahead):  # rare, so that few trails are read
-        better = False
-        if ti.static(len(v.cues) == 1):
-            better = is_better(c, v, ti.static(v.cues[0]), w, ant, ahead, here, tick)
-        else:
-            for i in ti.static(range(len(v.cues))):
-                if of_caste(c, ant, CasteRow.CUES) == i:
-                    better = is_better(c, v, ti.static(v.cues[i]), w, ant, ahead, here, tick)
-        event = ti.select(better, Event.ENTERED_CUE, Event.ENTERED_EMPTY)
+        better = by_cues(c, v, ant, is_better, ti.static((w, ant, ahead, here, tick)))
+        event = ti.select(better == 1, Event.ENTERED_CUE, Event.ENTERED_EMPTY)
     return event
 
 
@@ -494,7 +463,7 @@ def is_better(c, v, cues, w, ant, ahead, here, tick):
             better = bits >> trait(c.heading, ant) & 1 == 1
         else:
             better = is_stronger(ti.static(v.field(c, cues.followed)), ahead, here, tick)
-    return better
+    return ti.cast(better, ti.i32)
 
 
 @function
@@ -618,23 +587,18 @@ def lays_field(number: int) -> Callable[..., None]:
     return lay_apart
 
 
-@function
-def lays(c, v, ant, number: ti.template()):
+@while_compiling
+def lays(c, v, ant, number):
     """Return whether an ant lays a pheromone; without castes, always, while a kernel compiles."""
-    does = True
-    if ti.static(v.n_castes > 0):
-        does = ti.cast(of_caste(c, ant, CasteRow.LAYS), ti.i32) >> number & 1 == 1
-    return does
+    if v.n_castes == 0:
+        return True
+    return ti.cast(of_caste(c, ant, CasteRow.LAYS), ti.i32) >> number & 1 == 1
 
 
 @function
 def tally(c, v, state, chunk, n):
-    """Add n to a tally of a chunk, which one thread processes unless `v.by_ant`."""
-    if ti.static(v.by_ant):
-        if n != 0:
-            c.tallies[chunk * TALLY_WIDTH + state] += n
-    else:  # without `+=`, which would be atomic and slower
-        c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n
+    """Add n to a tally of a chunk."""
+    add(v, c.tallies, chunk * TALLY_WIDTH + state, n)
 
 
 @function
@@ -644,26 +608,14 @@ def count_apart(c, v, ant, chunk):
         column = chunk * layout.NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
         if ti.static(v.n_kinds > 1):
             column += trait(c.kind, ant)
-        if ti.static(v.by_ant):
-            c.delivered[column] += 1
-        else:
-            c.delivered[column] = c.delivered[column] + 1
+        add(v, c.delivered, column, 1)
     if ti.static(v.n_castes > 0):
-        column = chunk * constants.MAX_CASTES + trait(c.caste, ant)
-        if ti.static(v.by_ant):
-            c.delivered_by_caste[column] += 1
-        else:
-            c.delivered_by_caste[column] = c.delivered_by_caste[column] + 1
+        add(v, c.delivered_by_caste, chunk * constants.MAX_CASTES + trait(c.caste, ant), 1)
 
 
-@function
+@while_compiling
 def reward_of(c, v, ant):
-    reward = 0
-    if ti.static(v.has_own_reward):
-        reward = c.reward[ant]
-    else:
-        reward = event_reward(c, v, ant)
-    return reward
+    return subscript(None, c.reward, ant) if v.has_own_reward else event_reward(c, v, ant)
 
 
 @function
@@ -678,20 +630,14 @@ def event_reward(c, v, ant):
 
 @function
 def take_load(c, v, ant, index, tick):
-    """Take a load of food from a cell, which becomes empty with its last load."""
+    """Take a load of food from a cell; after its last load, its food source waits from now on."""
     loads_left = 0
     for took in ti.static(v.at["took"]):
         loads_left = took(ant_view(c, v, None, ant), cell_view(c, v, index), loads_left)
     if loads_left == 0:
         c.ground[index] = EMPTY
-        take_from_source(c, index, tick)
-
-
-@function
-def take_from_source(c, index, tick):
-    """Let the food source whose food was taken from a cell, if any, wait from now on."""
-    if c.n_food_sources > 0:
-        source = c.source_of[index]
-        if source >= 0:
-            c.food_sources[layout.FoodSourceRow.TAKEN, source] = tick
-            c.source_of[index] = -1
+        if c.n_food_sources > 0:
+            source = c.source_of[index]
+            if source >= 0:
+                c.food_sources[layout.FoodSourceRow.TAKEN, source] = tick
+                c.source_of[index] = -1

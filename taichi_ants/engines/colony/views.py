@@ -56,12 +56,10 @@ def _view(c: Any, v: Any, w: Any, nest: Any = None, ant: Any = None, cell: Any =
             return w
         if per in (ANT, CELL):
             return ant if per == ANT else cell
-        if per == MAP:
-            return columns.own_map(c, v, w, ant)
         if per == CASTE:
             return columns.trait(c.caste, ant)
-        number = columns.nest_of(c, v, ant) if nest is None else nest
-        return w * v.n_nests + number
+        of_nest = w * v.n_nests + (columns.nest_of(c, v, ant) if nest is None else nest)
+        return of_nest * c.size + subscript(None, c.cell, ant) if per == MAP else of_nest
 
     def group(name: str) -> Named:
         (numbers,) = [f.numbers for f in v.features if f.group == name and f.numbers]

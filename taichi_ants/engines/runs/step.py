@@ -161,14 +161,9 @@ def state_carrying(a: ti.template(), ant, left, forward, right):
 def state_foraging(half: ti.template(), left, forward, right, clock):
     """Return the paper's state of an ant without food that sees three packed cells."""
     trail_left, trail_forward, trail_right = left - clock, forward - clock, right - clock
-    return vision.paper_state_foraging(
-        half,
-        ground_of(left),
-        ground_of(forward),
-        ground_of(right),
-        trail_left,
-        trail_forward,
-        trail_right,
+    return vision.paper_state_by_level(
+        *(half, 0, ground_of(left), ground_of(forward), ground_of(right)),
+        *(trail_left, trail_forward, trail_right),
         ti.max(trail_left, ti.max(trail_forward, trail_right)),
     )
 

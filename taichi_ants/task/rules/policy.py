@@ -109,13 +109,10 @@ def choose_from_masks(compass: ti.template(), best: ti.template(), state, bits, 
 @ti.func
 def chance_of(values, action, explore_below):
     """Return the probability (f64) with which `choose` returns this action."""
-    best = best_value(values)
-    ties, explores = 0, ti.cast(explore_below, ti.f64) / 4294967296.0
-    for a in ti.static(range(N_ACTIONS)):
-        ties += 1 - ti.cast(values[a] < best, ti.i32)
+    best, explores = best_actions(values), ti.cast(explore_below, ti.f64) / 4294967296.0
     chance = explores / ti.cast(N_ACTIONS, ti.f64)
-    if not values[action] < best:
-        chance += (1.0 - explores) / ti.cast(ties, ti.f64)
+    if best >> action & 1 == 1:
+        chance += (1.0 - explores) / ti.cast(popcnt(best), ti.f64)
     return chance
 
 

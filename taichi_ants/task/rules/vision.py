@@ -30,40 +30,23 @@ def see_by_level(half: ti.template(), code, level, strongest):
 
 
 @ti.func
-def see_foraging(half: ti.template(), ground, level, strongest):
-    """Return the code of a cell for an ant without food; `ground` is the content of the cell."""
-    return see_by_level(half, ground & 3, level, strongest)
-
-
-@ti.func
 def see_carrying(ground, nearer):
     """Return the code of a cell for an ant with food; `nearer` is 1 if nearer to the queen."""
     return ground >> 2 | (ti.cast(ground == EMPTY, ti.i32) & nearer) * SEES_CUE
 
 
 @ti.func
-def paper_state_foraging(
-    half: ti.template(), left, forward, right, trail_left, trail_forward, trail_right, strongest
-):
-    """Return the paper's state of an ant without food, by contents and levels of three cells."""
+def paper_state_by_level(
+    half: ti.template(), carries: ti.template(), left, forward, right,
+    trail_left, trail_forward, trail_right, strongest,
+):  # fmt: skip
+    """Return the paper's state of an ant that follows a pheromone, by three contents and levels."""
+    shift = ti.static(2 * carries)
     return state_index(
-        0,
-        see_foraging(half, left, trail_left, strongest),
-        see_foraging(half, forward, trail_forward, strongest),
-        see_foraging(half, right, trail_right, strongest),
-    )
-
-
-@ti.func
-def paper_state_homing(
-    half: ti.template(), left, forward, right, trail_left, trail_forward, trail_right, strongest
-):
-    """Return the paper's state of an ant with food that follows a pheromone."""
-    return state_index(
-        1,
-        see_by_level(half, left >> 2, trail_left, strongest),
-        see_by_level(half, forward >> 2, trail_forward, strongest),
-        see_by_level(half, right >> 2, trail_right, strongest),
+        carries,
+        see_by_level(half, left >> shift & 3, trail_left, strongest),
+        see_by_level(half, forward >> shift & 3, trail_forward, strongest),
+        see_by_level(half, right >> shift & 3, trail_right, strongest),
     )
 
 

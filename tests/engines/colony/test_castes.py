@@ -142,30 +142,3 @@ def test_numbers_of_castes_change_in_an_episode():
     for name, fixed in (("share", 0.25), ("policy", "random"), ("threshold", Threshold())):
         with pytest.raises(AntsError, match=f"cannot change castes.a.{name}"):
             interventions.apply(SetTask(((f"castes.a.{name}", fixed),)))
-
-
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (
-            lambda: Colony(worlds.paper(), Task(castes={"minor": {}}), sharing="frozen"),
-            "`task.castes` has minor, which a colony with given actions does not support",
-        ),
-        (
-            lambda: Colony(
-                worlds.paper(),
-                Task(castes={"a": {"policy": "random"}}),
-                TRAINING,
-                sharing="independent",
-            ),
-            r"^`task\.castes\.a\.policy` is 'random', but sharing is \"independent\"",
-        ),
-        (
-            lambda: follows(Task(castes={"a": {"ants": 3}}), ants=5),
-            "the castes have 3 ants in nest 0, but 5 ants start there",
-        ),
-    ],
-)
-def test_what_does_not_fit_is_refused(make, says):
-    with pytest.raises(AntsError, match=says):
-        make()

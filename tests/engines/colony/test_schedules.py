@@ -150,25 +150,6 @@ def test_threads_are_chosen_by_short_trials(best):
     assert choice.numbers[choice.at] == best
 
 
-def test_threads_that_do_not_come_are_not_waited_for_without_end(monkeypatch):
-    """Seven parts for two threads: the first two leave the barrier, the rest is done by one."""
-    use_chunks(monkeypatch, 16)
-    monkeypatch.setattr(stepping, "_SPINS", 1000)
-    monkeypatch.setattr(ThreadChoice, "plan", lambda choice, ticks, most: (ticks, 7))
-    given_up, options = 0, {"ants": 30, "threads": 2}
-    expected = Colony(meadow(), LIVELY, TRAINING, 3, **options, schedule="by_world")
-    colony = Colony(meadow(), LIVELY, TRAINING, 3, **options, schedule="by_chunk")
-    for one in (expected, colony):
-        one.begin_episode()
-    for n in (1, 3, 20, 20):
-        expected.tick(n)
-        colony.tick(n)
-        given_up += colony.arrays["orders"][Order.FIRST] > 0
-        for name in expected.stored:
-            assert np.array_equal(colony.arrays[name], expected.arrays[name]), name
-    assert given_up == 4
-
-
 @pytest.mark.parametrize("spins", [0, 20, 4000, 100_000])
 def test_giving_up_at_any_barrier_gives_the_same(spins, monkeypatch):
     """With so little patience, threads give up here and there, and the rest follows on one."""

@@ -28,7 +28,6 @@ from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import Event
 from taichi_ants.worlds import paper
 
-DELIVERIES = ("terminates", "truncates")
 # Each entry is a kernel of its own, so that there are few: learner, observation, deposit.
 KERNELS = [
     *zip(
@@ -146,18 +145,6 @@ def test_every_step_with_rules_of_choice_and_noise(learner, observation, deposit
         assert (misread > 10) == ("misread" in noise)
 
 
-@pytest.mark.parametrize("delivery", DELIVERIES)
-@pytest.mark.parametrize("learner", [one[0] for one in KERNELS if one[1:] == ("paper", "set")])
-def test_every_step_in_the_papers_world(learner, delivery):
-    """Long enough to deliver, so that the end of an episode and the next one are compared too."""
-    more = {"planning_steps": 3} if learners.get(learner).plans else {}
-    config = TrainingConfig(learner, 0.01, 0.99, 0.3, 0.9, 0.01, more)
-    task = Task(delivery=delivery, evaporation_in_training=delivery == "truncates")
-    plain = assert_equal_steps(paper(), config, 3, 12, 120, task)
-    assert sum(plain.deliveries) >= 3
-    assert min(plain.steps) < 120
-
-
 def test_whole_trainings_of_a_mixed_sweep():
     """The kernel that trains equals the reference too, and runs do not disturb each other."""
     names = list(learners.registry.BUILT_IN)
@@ -185,10 +172,6 @@ def test_whole_trainings_of_a_mixed_sweep():
     [
         ("q_learning", "paper", "set", "greedy", NO_NOISE),
         ("sarsa", "paper", "fading", "greedy", NOISE),
-        pytest.param("sarsa", "ants", "add", "softmax", NO_NOISE, marks=pytest.mark.slow),
-        pytest.param(
-            "expected_sarsa", "trail_levels", "set", "greedy", NOISE, marks=pytest.mark.slow
-        ),
     ],
 )
 def test_many_runs_equal_single_ones(learner, observation, deposit, choice, noise, monkeypatch):

@@ -14,7 +14,7 @@ from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import GIVE, PICK_UP, Event, Reason
-from taichi_ants.worlds import World, from_text
+from taichi_ants.worlds import World
 
 # Each is a kernel of its own: observation, deposit, view, noise.
 KERNELS = [
@@ -139,39 +139,3 @@ def test_each_step_equals_the_reference(kernel):
             begins = arrays["results"] >= TRUNCATED
     assert delivered > (4 if kernel[-1] else 12)
     assert (slipped > 50) == (kernel[-1] == NOISE)
-
-
-BESIDE_FOOD = """
-      #
-    .   F
-  .   0   Q
-    .   .
-      .
-"""
-BEFORE_QUEEN = """
-      Q
-    .   .
-  .   0   F
-    .   .
-      .
-"""
-
-
-@pytest.mark.parametrize(
-    ("drawing", "actions", "reasons"),
-    [
-        (BESIDE_FOOD, [1, 4, 2], ["ROCK_OR_EDGE_AHEAD", "CARRIES_NO_FOOD", "FOOD_AHEAD"]),
-        (BESIDE_FOOD, [3, 4, 3], ["NONE", "NO_QUEEN_IN_VIEW", "CARRIES_FOOD_ALREADY"]),
-        (BESIDE_FOOD, [3, 1, 1], ["NONE", "NONE", "ROCK_OR_EDGE_AHEAD"]),  # the edge of the world
-        (BEFORE_QUEEN, [1, 3, 0], ["QUEEN_AHEAD", "NO_FOOD_IN_VIEW", "NONE"]),
-    ],
-)
-def test_reasons_say_why_nothing_happened(drawing, actions, reasons):
-    ants = BatchedEnvironments([from_text(drawing)], Task(), 1, 100, "continues", falls=False)
-    ants.seed([0], np.arange(1))
-    ants.step(0, Command.BEGIN)
-    told = []
-    for action in actions:
-        ants.step(np.array([action]))
-        told.append(Reason(ants.arrays["reasons"][0]).name)
-    assert told == reasons
