@@ -95,9 +95,23 @@ class ColonyState:
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
     """
 
-    if TYPE_CHECKING:  # the views of arrays, see below
+    if TYPE_CHECKING:  # the views of arrays, see below; features declare others
 
         def __getattr__(self, name: str) -> np.ndarray: ...
+
+        _stages: np.ndarray
+        actions: np.ndarray
+        carried: np.ndarray
+        carrying: np.ndarray
+        cells: np.ndarray
+        events: np.ndarray
+        executed: np.ndarray
+        headings: np.ndarray
+        nests: np.ndarray
+        next_actions: np.ndarray
+        numbers: np.ndarray
+        paper_states: np.ndarray
+        states: np.ndarray
 
     def __init__(
         self,
