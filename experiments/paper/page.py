@@ -67,18 +67,13 @@ def get_ready(world: World, task: Task) -> None:
 
 
 def begin(
-    comparison: Comparison,
-    baselines: Sequence[Baseline],
-    examples: Sequence[Example],
-    saved: process.Begun,
+    comparison: Comparison, baselines: list[Baseline], examples: list[Example], saved: process.Begun
 ) -> Callable[[], Seen]:
     """Return a function that waits until figures are `saved`, and for all that the page shows.
 
     This process follows the policies, because it has compiled the kernel.
     """
-    first: dict[int, Example] = {}
-    for example in examples:
-        first.setdefault(int(comparison.behaviours[example.row, example.run]), example)
+    first = {int(comparison.behaviours[one[:2]]): one for one in reversed(examples)}
     calls: dict[Any, process.Begun] = {"saved": saved}
     done, captions = counts(comparison.behaviours), dict[int, tuple[str, str]]()
     sheet = None
