@@ -99,6 +99,10 @@ class ColonyState:
 
         def __getattr__(self, name: str) -> np.ndarray: ...
 
+        _array: np.ndarray = np.zeros(0)
+        actions = carried = carrying = cells = events = executed = headings = nests = _array
+        next_actions = numbers = paper_states = states = _array  # so that editors know them
+
     def __init__(
         self,
         world: World | Sequence[World],
