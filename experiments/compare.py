@@ -18,7 +18,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import gc
 
     gc.set_threshold(300_000)  # with Python's default, collections take a tenth of the time
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
     from dataclasses import dataclass, fields, replace
     from functools import partial
     from itertools import product
@@ -237,9 +237,7 @@ def tables(plan: Plan, results: Results) -> str:
     baselines = plan.exact() + bounds.policy_rows(first.world, first.task, follow, *runs)
     saved = process.begin(figures.save_all, comparison, baselines, folder / "figures")
     chosen = [trained(study, row, run, arch) for row, run in examples(comparison)]
-    seen: Callable[[], Seen] = Seen
-    if results.figures:
-        seen = page.begin(comparison, baselines, chosen, saved)
+    seen = page.begin(comparison, baselines, chosen, saved) if results.figures else Seen
 
     summaries = summarise(comparison)
     lines, audit = table2(comparison, summaries), assess(comparison)

@@ -39,11 +39,8 @@ globalThis.pass = (run, act) => {
   const { lanes } = run.facts, { engine } = run;
   const drawn = lanes < 0 ? -1 : run.tick - lanes - PAUSE;
   if (drawn === 0) {
-    const cells = run.suggestion().map(([x, y]) => {
-      const r = Math.round(x / 1.5);
-      return engine.at(Math.round(r / 2 - y / Math.sqrt(3)), r);
-    });
-    run.stroke = engine.line(...cells);
+    const [from, to] = run.suggestion().map(([x, y]) => cellAt(x, y));
+    run.stroke = [from, ...lineTo(from, to)].map(([q, r]) => engine.at(q, r));
   }
   if (drawn >= 0 && drawn < STROKE) {
     const at = (n) => Math.floor(n * run.stroke.length / STROKE);

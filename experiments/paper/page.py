@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +20,7 @@ from taichi_ants.analysis import style
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
-from taichi_ants.engines.runs.results import RolloutArguments, Trace
+from taichi_ants.engines.runs.results import RolloutArguments
 from taichi_ants.engines.runs.training import rollout
 from taichi_ants.errors import count
 from taichi_ants.rendering.snapshots import colony_of_rollout
@@ -44,14 +43,6 @@ class Example(NamedTuple):
     point: RunPoint
     seed: int
     q_values: np.ndarray
-
-    def played(self) -> Trace:
-        """Return the first steps of the episode by which its behaviour was classified.
-
-        It has the evaporation of training, not that of the greedy evaluation.
-        """
-        steps, task = min(self.point.max_steps, STEPS), as_in_training(self.point.task)
-        return rollout(self.point.world, self.q_values, self.seed, 0, steps, task)
 
 
 class Seen(NamedTuple):
@@ -76,47 +67,41 @@ def get_ready(world: World, task: Task) -> None:
 
 
 def begin(
-    comparison: Comparison,
-    baselines: Sequence[Baseline],
-    examples: Sequence[Example],
-    saved: process.Begun,
+    comparison: Comparison, baselines: list[Baseline], examples: list[Example], saved: process.Begun
 ) -> Callable[[], Seen]:
-    """Return a function that waits until figures are `saved`, and draws what the page shows.
+    """Return a function that waits until figures are `saved`, and for all that the page shows.
 
     This process follows the policies, because it has compiled the kernel.
     """
-    first: dict[int, Example] = {}
-    for example in examples:
-        first.setdefault(int(comparison.behaviours[example.row, example.run]), example)
+    first = {int(comparison.behaviours[one[:2]]): one for one in reversed(examples)}
     calls: dict[Any, process.Begun] = {"saved": saved}
-    for code, example in first.items():
-        calls[code] = process.begin(record_trace, example.played(), BEHAVIOURS[code])
-    calls["figures"] = process.begin(figures.for_page, comparison, baselines)
     done, captions = counts(comparison.behaviours), dict[int, tuple[str, str]]()
-    for code, example in sorted(first.items()):
-        _, variant, grid = comparison.rows[example.row]
+    sheet = None
+    for code, (row, _, point, seed, q_values) in sorted(first.items()):
+        _, variant, grid = comparison.rows[row]
         whose = (
-            f"{variant.label}, delivery {example.point.task.delivery}, seed {example.seed}, "
+            f"{variant.label}, delivery {point.task.delivery}, seed {seed}, "
             f"{grid.label} (learning rate / discount / epsilon / decay)"
         )
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Shown: {whose}."
         captions[code] = sentence(BEHAVIOURS[code]), words
+        # The first steps of the episode by which the behaviour was classified.
+        how: Any = seed, 0, min(point.max_steps, STEPS), as_in_training(point.task)
+        trace = rollout(point.world, q_values, *how)
+        calls[code] = process.begin(record_trace, trace, BEHAVIOURS[code])
         if code == DELIVERS:
-            words, title = f"The policy of an ant: {whose}", f"{variant.label}: policy"
-            calls["sheet"] = partial(_sheet, words, example, title)
+            image = policy_sheet(q_values, f"{variant.label}: policy", task=point.task)
+            sheet = Picture.of(f"The policy of an ant: {whose}", image)
+    calls["figures"] = process.begin(figures.for_page, comparison, baselines)
 
     def wait() -> Seen:
         with progress_bar("pictures") as progress:
             results = process.results_of(calls, progress)
         players = [Player(*captions[code], results[code]) for code in sorted(first)]
-        return Seen(results["figures"], players, results.get("sheet"))
+        return Seen(results["figures"], players, sheet)
 
     return wait
-
-
-def _sheet(words: str, example: Example, title: str) -> Picture:
-    return Picture.of(words, policy_sheet(example.q_values, title, task=example.point.task))
 
 
 def comparison_page(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from typing import Any
 
@@ -19,12 +19,9 @@ _process: Workers | None = None
 def second(wanted: bool) -> Iterator[None]:
     """Yield while there is a second process, if it is wanted and the machine can run two."""
     global _process
-    if wanted and available_threads() > 1:
-        with Workers(1) as _process:
-            yield
-        _process = None
-    else:
+    with Workers(1) if wanted and available_threads() > 1 else nullcontext() as _process:
         yield
+    _process = None
 
 
 def begin(call: Callable[..., Any], *given: Any, **named: Any) -> Begun:

@@ -34,11 +34,7 @@ def choose_by_rule(
 def pay(world: WorldState, was: Ant, ant: Ant, rule: Rule, task: Task, tick: int) -> int:
     """Return the reward of an ant by your rule, after the tick; `was` is the ant before it."""
     inputs = {"paper_state": was.paper_state, "next_paper_state": ant.paper_state}
-    inputs |= {
-        "reward": ant.reward,
-        "event": ant.event,
-        **facts_of(world, ant, task, tick, ()),
-    }
+    inputs |= {"reward": ant.reward, "event": ant.event, **facts_of(world, ant, task, tick, ())}
     return int(computed(rule, task.rules, inputs))
 
 

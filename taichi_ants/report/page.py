@@ -63,18 +63,16 @@ class Player(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """An image as a PNG in base64 (`data`), with alternative text (`words`)."""
+    """An image of a `shape` as a PNG in base64 (`data`), with alternative text (`words`)."""
 
     words: str
-    width: int
-    height: int
+    shape: tuple[int, ...]
     data: str
 
     @classmethod
     def of(cls, words: str, image: np.ndarray) -> Picture:
         """Return the picture of an image, uint8 (height, width, 3)."""
-        height, width, _ = image.shape
-        return cls(words, width, height, base64.b64encode(png(image, optimize=True)).decode())
+        return cls(words, image.shape, base64.b64encode(png(image, optimize=True)).decode())
 
 
 class ShownFinding(NamedTuple):

@@ -159,11 +159,10 @@ class Workers(Executor):
         raise BrokenExecutor("worker processes die as soon as they start")
 
     def _new_pool(self) -> ProcessPoolExecutor:
-        # A fork spares imports. It has none of the threads of this process, and Taichi needs its.
-        tasks = Path("/proc/self/task")  # on Linux
-        kind = "fork" if tasks.is_dir() and len([*tasks.iterdir()]) == 1 else "spawn"
-        lines = self._end, self._line
-        return ProcessPoolExecutor(1, multiprocessing.get_context(kind), _end_with, lines)
+        # A fork spares imports, but has only one thread; Taichi and others need theirs.
+        tasks = [*Path("/proc/self/task").glob("*")]  # on Linux
+        start = multiprocessing.get_context("fork" if len(tasks) == 1 else "spawn")
+        return ProcessPoolExecutor(1, start, _end_with, (self._end, self._line))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the workers after their calls; they save the kernels that they have compiled."""

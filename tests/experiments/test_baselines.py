@@ -169,7 +169,7 @@ def test_scripts_print_a_row_for_each_case(kernels: Path, tmp_path: Path, capsys
     assert rows[:2] == [["paper", "ant_system", "18"], ["paper", "max_min", "18"]]
     arguments = ["--seeds", "2", "--ants", "5", "--ticks", "300", "--room", "1", "3"]
     utility.print_table(utility.parse_arguments(arguments))
-    rows = [line.split() for line in capsys.readouterr().out.splitlines()[2:-1]]
+    rows = [line.split() for line in capsys.readouterr().out.strip().splitlines()[2:]]
     expected = [[kind, room] for kind in ("paper", "open", "piles", "bridge") for room in "13"]
     assert [row[:2] for row in rows] == expected
     how = {"ticks": 300, "ants": 5, "colonies": 4, "capacity": 3}

@@ -355,11 +355,8 @@ def join_pair(c, v, entry, joined, found):
         if ti.static(v.learner.plans):
             if before == 0:
                 c.sums_of[SumRow.LATEST, joined] = -1
-            latest, transition = (
-                c.sums_of[SumRow.LATEST, entry],
-                c.sums_of[SumRow.TRANSITION, entry],
-            )
-            note_transition(c, joined, latest, transition)
+            transition = c.sums_of[SumRow.TRANSITION, entry]
+            note_transition(c, joined, c.sums_of[SumRow.LATEST, entry], transition)
         c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
 
 

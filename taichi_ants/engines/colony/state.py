@@ -95,23 +95,13 @@ class ColonyState:
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
     """
 
-    if TYPE_CHECKING:  # the views of arrays, see below; features declare others
+    if TYPE_CHECKING:  # the views of arrays, see below
 
         def __getattr__(self, name: str) -> np.ndarray: ...
 
-        _stages: np.ndarray
-        actions: np.ndarray
-        carried: np.ndarray
-        carrying: np.ndarray
-        cells: np.ndarray
-        events: np.ndarray
-        executed: np.ndarray
-        headings: np.ndarray
-        nests: np.ndarray
-        next_actions: np.ndarray
-        numbers: np.ndarray
-        paper_states: np.ndarray
-        states: np.ndarray
+        _array: np.ndarray = np.zeros(0)
+        actions = carried = carrying = cells = events = executed = headings = nests = _array
+        next_actions = numbers = paper_states = states = _array  # so that editors know them
 
     def __init__(
         self,

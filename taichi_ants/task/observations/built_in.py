@@ -111,9 +111,7 @@ def queues(view):
 BUILT_IN = (
     of_codes(paper, summary="the three cells ahead, four codes each"),
     of_codes(
-        five_cells,
-        cells=(-2, -1, 0, 1, 2),
-        summary="all neighbouring cells except the one behind",
+        five_cells, cells=(-2, -1, 0, 1, 2), summary="all neighbouring cells except the one behind"
     ),
     of_codes(six_cells, cells=(-2, -1, 0, 1, 2, 3), summary="all neighbouring cells"),
     of_codes(
