@@ -27,7 +27,6 @@ BATCHED = "tests/engines/runs/test_batched.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
 RASTER = "tests/rendering/test_raster.py"
 CASTES = "tests/engines/colony/test_castes.py"
-SCHEDULES = "tests/engines/colony/test_schedules.py"
 ENGINE = "tests/engines/colony/test_engine.py"
 BY_ANT = "tests/engines/colony/test_by_ant.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
@@ -225,7 +224,7 @@ MUTATIONS = [
     ("engines/colony/learning.py", "* _ONE + 0.5)", "* _ONE)", COLONY),
     ("engines/colony/learning.py", "shape[0] - 1)]  #", "shape[0] - 2)]  #", COLONY),
     ("engines/colony/learning.py", "c.initial_q, 0.0)", "0.0, 0.0)", COLONY),
-    ("engines/colony/learning.py", "if number > c.sums_of", "if number < c.sums_of", SCHEDULES),
+    ("engines/colony/learning.py", "if number > c.sums_of", "if number < c.sums_of", COLONY),
     (
         "engines/colony/learning.py",
         "max(c.latest[entry], words)",
