@@ -62,7 +62,7 @@ def test_copies_of_colonies_with_given_actions_go_on_alike(tmp_path):
             one.act(actions)
     assert all(one.is_given_actions and one == colony for one in others)
     colony.reset_worlds(np.array([True, False, True]), [9, 9])  # seeds may repeat
-    with pytest.raises(AntsError, match=r"^seeds contains 9 more than once; "):
+    with pytest.raises(AntsError, match=r"^seeds contains 9 more than once"):
         colony.save(tmp_path / "never.npz")
 
 
