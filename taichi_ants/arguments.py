@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence, Sized
 from numbers import Real
 
 import numpy as np
@@ -16,7 +16,7 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.worlds.world import STARTS, World
 
-MAX_ANTS = 1 << 24
+MAX_ANTS = MAX_SEEDS = 1 << 24
 ALONE = "a run of one ant", LONE, "leave it out, or use a Colony"
 
 
@@ -171,7 +171,9 @@ def checked_configs(
 
 
 def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
-    """Return one or several seeds as a tuple; AntsError if two are equal."""
+    """Return one or several seeds as a tuple; AntsError if two are equal, or for too many."""
+    if isinstance(seeds, Sized) and len(seeds) > MAX_SEEDS:
+        raise AntsError(f"seeds has {len(seeds)} entries; give at most {MAX_SEEDS}.")
     listed = entries_of(seeds.ravel().tolist() if isinstance(seeds, np.ndarray) else seeds)
     listed = [seeds] if listed is None else listed
     checked = tuple(checked_whole("a seed", seed, -(2**63), 2**64 - 1) for seed in listed)

@@ -548,7 +548,7 @@ def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
     """Return the end of a message about an unknown name, with the most similar known names."""
     names, sought = list(known), str(name).lower()
     # Longer names are similar by chance.
-    near = difflib.get_close_matches(sought, names, 3, 0.6 if len(sought) < 9 else 0.75) or names
+    near = difflib.get_close_matches(sought, names, 3, 0.7 if len(sought) < 9 else 0.75) or names
     of = f" of {group}" if group else ""
     if not near:
         return f"is not a setting{of}, which has none; leave it out."

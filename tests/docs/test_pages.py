@@ -8,12 +8,14 @@ so do the lines of a `text` block that follows.
 import re
 import subprocess
 import sys
+from itertools import islice
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
 from command_lines import ROOT, environment
 
+AT_ONCE = "\t"  # before a line that is printed right after the one before it
 BLOCK = re.compile(r"^```(?P<language>\w*)\n(?P<code>.*?)^```$", re.M | re.S)
 PAGES = {
     str(path.relative_to(ROOT)): text
@@ -32,7 +34,8 @@ def program_and_lines(text: str) -> tuple[str, list[str]]:
                 parts.append(block["code"])
                 lines += re.findall(r"^print\(.*\) +# ([-\d([{TF].*)$", block["code"], re.M)
         elif block["language"] == "text" and runs:
-            lines += filter(None, block["code"].splitlines())
+            first, *others = filter(None, block["code"].splitlines())
+            lines += [first, *(AT_ONCE + line for line in others)]
     return "\n\n".join(parts), lines
 
 
@@ -68,10 +71,12 @@ def test_the_program_of_a_page_prints_what_the_page_says(page, kernels, tmp_path
     how = {"cwd": tmp_path, "env": environment(kernels), "capture_output": True, "text": True}
     done = subprocess.run([sys.executable, str(script)], timeout=300, check=False, **how)
     assert done.returncode == 0, done.stderr
-    printed = iter(done.stdout.splitlines())
-    for line in lines:  # in this order, with others between them
-        begins = (one and re.match(rf"{re.escape(one)}(?![\w.])", line) for one in printed)
-        assert any(begins), (line, done.stdout)
+    printed = filter(None, done.stdout.splitlines())
+    for line in lines:  # in this order; lines between them are not on the page
+        text, at_once = line.removeprefix(AT_ONCE), line.startswith(AT_ONCE)
+        rest = islice(printed, 1) if at_once else printed
+        begins = (re.match(rf"{re.escape(one)}(?![\w.])", text) for one in rest)
+        assert any(begins), (text, done.stdout)
 
 
 # The README: its code, its numbers, its links and its pictures.
