@@ -217,7 +217,8 @@ def command(name: str) -> str:
                 formatter = parser._get_formatter()
                 words = formatter._format_action_invocation(action)
                 short = not action.option_strings
-                usage += f" {words}" if short else ""
+                shown = f"[{words}]" if action.nargs == "?" else words
+                usage += f" {shown}" if short else ""
                 lines.append([f"`{words}`", formatter._expand_help(action) if action.help else ""])
         about = " ".join((parser.description or "").split())
         head = f"### `{parser.prog}`\n\n" if kinds else ""
