@@ -84,8 +84,8 @@ export const QUESTIONS = [
       const share = longShare(run);
       return { right: share < 40 ? 0 : share > 60 ? 2 : 1,
                head: share < 40 ? "Most take the short way." : share > 60 ? "Most take the long way." : "They use both ways.",
-               sub: `${bold(`${share} %`)} take the long one. On the short way ants return sooner, so its scent is fresher. `
-                 + "Real ants were asked in 1989. Do 64 ants choose the same? Try it." };
+               sub: `Of the ants with food, ${bold(`${share} %`)} take the long one. They feel where home is: even without scent, `
+                 + "most of them take the short way. Real ants were asked in 1989. Do 64 ants choose the same? Try it." };
     },
   },
   {

@@ -32,7 +32,7 @@ export function storyOf(run) {
     return { id: "lanes", head: "Nobody told them the way.", call: "Draw a wall across it.", ghost: true,
              sub: `It took them ${bold(seconds(facts.lanes))}. Now food comes home every ${bold(`${each.toFixed(2)} s`)}`
                + (run.tick - facts.lanes < UNTOUCHED ? ", along scent that they lay themselves."
-                 : ". None of this is built in: switch Learning off and start again, and hardly any comes.") };
+                 : ". Without learning, hardly any comes: switch Learning off, and start again.") };
   }
   if (facts.firstHome >= 0) {
     const several = run.engine.deliveries > 1;
