@@ -67,7 +67,7 @@ def test_a_question_waits_for_a_prediction_and_a_function_is_checked_step_by_ste
     tab.keyboard.type("Equal to the last bit")
     assert check.is_enabled()
     for written, said in (
-        ("q[s][a] += (", "This JavaScript does not run yet: "),
+        ("} function next( {", "This JavaScript does not run yet: Unexpected token '}'."),
         ("q[s][b] = r;", "Your function stopped with an error: b is not defined."),
         ("while (true) { }", "Your function stopped with an error: a loop does not end."),
         ("q[s][a] += alpha * r;", "In episode 0, step"),

@@ -43,6 +43,7 @@ export function written(code, name) {
   const round = () => { must(++rounds < MOST_ROUNDS, "a loop does not end"); return true; };
   const guarded = code.replace(/\bwhile\s*\(/g, "while (round() && ").replace(/\bfor\s*\(([^;()]*);\s*(?=[^;\s])/g, "for ($1; round() && ");
   try {
+    new Function(`"use strict";\n${code}`); // alone, so that an error is about what the student wrote
     own = new Function("round", `"use strict";\n${guarded}\nreturn typeof ${name} === "function" && ${name};`)(round);
   } catch (error) {
     throw new Error(`This JavaScript does not run yet: ${error.message}.`);

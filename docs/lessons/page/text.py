@@ -33,10 +33,9 @@ _WORDS = (
     (r"\*\*(.+?)\*\*", r"<b>\1</b>"),
     (r"\*(\S|\S.*?\S)\*", r"<i>\1</i>"),
 )
-_EXERCISES = (
-    "<h2>Exercises</h2>",
-    '<h2>Exercises</h2><p class="aside">Do them on paper, in the notebook, or in fields below.</p>',
-)
+_EXERCISES = "<h2>Exercises</h2>"
+_WHERE = '<p class="aside">Do them on paper or in the notebook.{}</p>'
+_FIELD = " You can write the function below in this page."
 _LIST = re.compile(r"^(?:- |\d\. )", re.M)
 
 
@@ -126,7 +125,8 @@ def lesson(path: Path) -> str:
             )
             solutions += 1
         else:
-            parts.append(markdown(source).replace(*_EXERCISES))
+            where = _EXERCISES + _WHERE.format(_FIELD if names else "")
+            parts.append(markdown(source).replace(_EXERCISES, where))
         if note := metadata.get("teachers"):
             parts.append(f'<aside class="teachers"><b>For teachers.</b> {inline(note)}</aside>')
         parts += [piece(name, cell) for name in names]
