@@ -58,7 +58,7 @@ export class Controls {
   }
 
   build() {
-    const rules = selected("rules", "Rules", RULE_NAMES, "Rules: what ants see and who gives way and where scent points. A change starts again.") + '<div class="parts" id="parts" hidden>'
+    const rules = selected("rules", "Rules", RULE_NAMES, "Rules: what ants see, who gives way, and where scent points. A change starts the run again.") + '<div class="parts" id="parts" hidden>'
       + `${PART_NAMES.map(([part, words]) => `<label><input type="checkbox" data-part="${part}">${words}</label>`).join("")}</div></div>`;
     const [ants, exploration, ...others] = SLIDERS.filter(({ more }) => !more).map(slider);
     byId("controls").innerHTML = ants + exploration + switched("learns", "Learning", "Learning: while it is off they go on with what they know and learn nothing more") + others.join("") + rules;

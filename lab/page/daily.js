@@ -42,5 +42,5 @@ export function dailyStory(run) {
              sub: `${name}, with ${bold(String(used))} of ${DAILY.rocks} rocks. “Copy link” holds your result: anyone can replay it.` };
   }
   return { id: `daily-${seed}`, head: `${name}. Most food wins.`, call: used < DAILY.rocks ? `${DAILY.rocks - used} rocks left. Click to place one.` : "",
-           sub: `${bold(many(run.engine.deliveries))} loads so far; ${bold(seconds(DAILY.ticks - run.tick))} left. Rocks can only hinder. Where do they help?` };
+           sub: `${bold(many(run.engine.deliveries))} loads so far; ${bold(seconds(DAILY.ticks - run.tick))} left. Rocks block ants. Where can they help all the same?` };
 }

@@ -50,7 +50,7 @@ class Lab {
     this.firstFrame = 0;
     this.told = "";   // what the story told last
     this.minds = 0;
-    byId("questions").innerHTML = "<h2>What do you expect?</h2><p>Six questions, each with its own world. To open one ends your run.</p>"
+    byId("questions").innerHTML = "<h2>What do you expect?</h2><p>Six questions, each with its own world. Opening one ends your run.</p>"
       + QUESTIONS.map(({ id, title, ask, sub }) => `<button data-question="${id}" title="${ask} ${sub}">${title}</button>`).join("")
       + '<button data-question="daily" title="Bring home the most food in 2000 ticks with at most ten rocks">Today’s map: ten rocks</button>'
       + '<button id="train" title="Train the paper’s single ants, and compare how fast they learn">One ant, alone: learning curves</button>';

@@ -78,5 +78,5 @@ export function mindOf(run, ui) {
   const own = ui.followed >= 0 && ui.followed < e.ants ? antCard(run, ui.followed, look)
     : "<p>Click an ant with the eye to see what it sees, and why it does what it does.</p>";
   return `${own}<p>All ants share one table: for each view, the value of each action (bars: left, on, right, pick up, give). `
-    + `Below: how often the action shown is the best one.</p>${cards.join("")}`;
+    + `Below: the action that is best most often in such views, and its share of the times that ants met them.</p>${cards.join("")}`;
 }

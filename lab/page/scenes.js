@@ -45,8 +45,8 @@ export const QUESTIONS = [
     answer: ([left, right]) => ({
       right: right.food > left.food ? 0 : 1,
       head: right.food > left.food ? "The hint helped." : "They walk for the sake of walking.",
-      sub: `${bold(many(right.food))} loads against ${bold(many(left.food))}, yet ${bold(many(right.points))} points against `
-        + `${bold(many(left.points))}. They do what they are paid for, and not what was meant.`,
+      sub: `Right ${bold(many(right.food))}, left ${bold(many(left.food))} loads; yet right ${bold(many(right.points))}, left `
+        + `${bold(many(left.points))} points. They do what they are paid for, and not what was meant.`,
     }),
   },
   {
@@ -59,7 +59,7 @@ export const QUESTIONS = [
     answer: ([left, right]) => {
       const share = right.food / Math.max(1, left.food);
       return { right: share > 1.25 ? 1 : share < 0.75 ? 2 : 0, head: share < 0.75 ? "Copies jam." : `${many(right.food)} loads.`,
-               sub: `${bold(many(right.food))} loads against ${bold(many(left.food))}. The one ant never met another, so none of its copies `
+               sub: `Right ${bold(many(right.food))}, left ${bold(many(left.food))} loads. The one ant never met another, so none of its copies `
                  + "knows how to pass one." };
     },
   },
@@ -97,7 +97,7 @@ export const QUESTIONS = [
     answer: ([left, right]) => {
       const ratio = left.food / Math.max(1, right.food);
       return { right: ratio > 1.25 ? 0 : ratio < 0.8 ? 1 : 2, head: ratio > 1.25 ? "It pays to go on learning." : "They know enough.",
-               sub: `${bold(many(left.food))} loads against ${bold(many(right.food))}. What was right before the wall is wrong behind it: `
+               sub: `Left ${bold(many(left.food))}, right ${bold(many(right.food))} loads. What was right before the wall is wrong behind it: `
                  + "ants that learn give up pushing against it." };
     },
   },
@@ -110,7 +110,7 @@ export const QUESTIONS = [
       const ratio = right.food / Math.max(1, left.food);
       return { right: ratio > 1.1 ? 0 : ratio < 0.9 ? 2 : 1, head: ratio > 1.1 ? "Random steps pay." : ratio < 0.9 ? "Random steps cost food." : "It hardly matters.",
                sub: `Right ${bold(many(right.food))}, left ${bold(many(left.food))} loads. Random steps find food, and lose the way. `
-                 + "Now change any setting: it applies to the right half only." };
+                 + "Now change any setting." };
     },
   },
 ];
@@ -135,6 +135,6 @@ export function questionStory(question, runs) {
     return { id: `run-${id}`, head: ask, sub: `You said: ${bold(options[question.said].toLowerCase())}. ${soFar} The answer comes in ${bold(seconds(left / question.speed))}.` };
   }
   const { right, head, sub } = question.found, next = QUESTIONS[(QUESTIONS.findIndex((one) => one.id === id) + 1) % QUESTIONS.length];
-  return { id: `answer-${id}`, head, sub: `${right === question.said ? "You were right." : "Not what you said."} ${sub}`,
+  return { id: `answer-${id}`, head, sub: `${right === question.said ? "You were right." : "Not what you said."} ${sub}${sides.length > 1 ? " Settings apply to the right half only." : ""}`,
            options: [`Next: ${next.title.charAt(0).toLowerCase()}${next.title.slice(1)}`, "Back to the first screen"], next };
 }

@@ -67,7 +67,7 @@ function wallStory(run) {
   if (wall.detour >= 0) {
     const share = wall.rate ? Math.round(100 * run.sum(200) / wall.rate) : 0;
     const sub = since < 260 ? "Ten loads from behind your wall are home. Nobody told the ants that it is there."
-      : wall.compares ? `Now ${bold(`${share} %`)} as much food comes home as before your wall. Scent shows the others the way round.`
+      : wall.compares ? `${share < 100 ? `Now ${bold(`${share} %`)} as much food` : "As much food or more"} comes home as before your wall. Scent shows the others the way round.`
       : `${plural(wall.came, "load")} came round your wall. Scent shows the others the way.`;
     return { id: `detour${wall.number}`, head: `They found a detour in ${seconds(wall.detour - wall.last)}.`, sub,
              call: wall.number > 2 ? "Erase a gap. What do they do?" : "Can you stop them?" };
