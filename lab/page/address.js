@@ -53,19 +53,18 @@ export class Address {
   }
 
   async copy() {
-    const text = visitOf(this.lab.runs);
+    const { runs } = this.lab, text = visitOf(runs), ticks = runs.map(({ tick }) => many(tick)).join(" and "); // runs go on meanwhile
     this.show(text);
     const done = await copied(`${location.href.split("#")[0]}#${text}`);
-    const { tick } = this.lab.runs[0];
-    this.lab.toast(done ? `Link copied: ${many(text.length)} characters. It replays these ${many(tick)} ticks to the same state.`
+    this.lab.toast(done ? `Link copied: ${many(text.length)} characters. It replays these ${ticks} ticks to the same state.`
       : `The address holds it now, ${many(text.length)} characters. Copy it from there.`, 5000);
   }
 
   /** Three lines of Python that replay the right run, and print the state that the page shows. */
   async verify() {
-    const run = this.lab.runs[this.lab.runs.length - 1], lines = pythonOf(run.engine);
+    const { runs } = this.lab, { engine, tick } = runs[runs.length - 1], lines = pythonOf(engine), hash = engine.hash();
     const done = await copied(lines);
-    this.lab.toast(done ? `Three lines of Python copied. They print ${run.engine.hash()}, the state at tick ${many(run.tick)}.`
+    this.lab.toast(done ? `Three lines of Python copied. They print ${hash}, the state${runs.length > 1 ? " of the right world" : ""} at tick ${many(tick)}.`
       : "This browser does not let the page copy. The link in the address verifies as well.", 6000);
     return lines;
   }

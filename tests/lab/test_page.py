@@ -186,6 +186,22 @@ def test_a_visit_by_touch_on_a_phone_replays_in_python_to_the_same_hash(opened, 
 
 
 @pytest.mark.browser
+def test_messages_name_the_moment_that_was_copied_while_the_run_goes_on(opened):
+    page = opened("#copies")
+    page.read("lab.say(0); lab.play(false)")
+    page.read("""navigator.clipboard.writeText = async (text) => {
+        window.pasted = text;
+        for (let k = 0; k < 5; k++) lab.advance();
+    }""")
+    ticks = page.read("lab.runs.map((run) => run.tick.toLocaleString('en').replace(',', '\u202f'))")
+    page.read("lab.address.copy()")
+    assert f"these {ticks[0]} and {ticks[1]} ticks" in page.tab.inner_text("#toast")
+    page.read("lab.address.verify()")
+    state = page.read("pasted").split()[-1]
+    assert f"{state}, the state of the right world" in page.tab.inner_text("#toast")
+
+
+@pytest.mark.browser
 def test_everything_works_by_keyboard(opened):
     page = opened()
     page.tab.focus(".world")
