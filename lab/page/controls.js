@@ -1,5 +1,6 @@
 /* controls.js: the settings, speeds and brushes beside the world. */
 
+import { beginDaily } from "./daily.js";
 import { LEARNERS, PARTS, RULES } from "./engine.js";
 import { byId, icon } from "./page.js";
 import { many, seconds } from "./story.js";
@@ -79,7 +80,7 @@ export class Controls {
     on("parts", ({ dataset }) => this.lab.restart({ rules: this.scene.rules ^ PARTS[dataset.part] }));
     on("learner", ({ value }) => this.lab.restart({ learner: Number(value) }));
     on("reach", ({ value }) => { this.lab.ui.reach = Number(value); });
-    on("place", ({ value }) => this.lab.restart({ world: Number(value), ants: CROWDS[WORLDS[value].name] || 64 }));
+    on("place", ({ value }) => (WORLDS[value].daily ? beginDaily(this.lab) : this.lab.restart({ world: Number(value), ants: CROWDS[WORLDS[value].name] || 64 })));
     on("seed", ({ value }) => this.lab.restart({ seed: Math.max(0, Math.min(2 ** 32 - 1, Math.floor(value))) }));
     on("theme", ({ value }) => this.lab.setTheme(value));
   }

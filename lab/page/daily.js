@@ -20,18 +20,22 @@ export function beginDaily(lab, seed = seedOf(new Date())) {
   lab.choose("rock");
   lab.controls.show();
   lab.play(true);
-  lab.address.show("daily");
+  if (seed === seedOf(new Date())) lab.address.show("daily");
+  else lab.address.save();
 }
 
 /** Whether a run is on a daily map. */
 export const isDaily = (run) => run.scene.world === WORLD;
 
+/** Whether a run has its result: it waits, so that its link holds the same. */
+export const isOver = (run) => isDaily(run) && run.tick >= DAILY.ticks && counts(run);
+
 /** Whether another rock may be drawn; a rock is one click. */
 export const mayPlace = (run) => run.tick < DAILY.ticks && run.engine.events.length < DAILY.rocks;
 
 export function dailyStory(run) {
-  const used = run.engine.events.length, { seed } = run.scene, today = seed === seedOf(new Date());
-  const name = today ? "Today’s map" : `The map of ${String(seed).replace(/(....)(..)/, "$1-$2-")}`;
+  const used = run.engine.events.length, { seed } = run.scene, date = /^(20\d\d)(0[1-9]|1[0-2])([0-2]\d|3[01])$/;
+  const name = seed === seedOf(new Date()) ? "Today’s map" : `The map of ${date.test(String(seed)) ? String(seed).replace(date, "$1-$2-$3") : `seed ${seed}`}`;
   if (!counts(run)) {
     return { id: "daily-free", head: `${name}, played freely.`, sub: "With other settings or strokes, this visit does not count. Start it anew for a result.",
              options: ["Play it by the rules"] };

@@ -3,7 +3,7 @@
 import { Address } from "./address.js";
 import { Brush } from "./brush.js";
 import { Controls } from "./controls.js";
-import { beginDaily, dailyStory, isDaily, mayPlace } from "./daily.js";
+import { beginDaily, dailyStory, isDaily, isOver, mayPlace } from "./daily.js";
 import { Painter } from "./draw.js";
 import { Embed } from "./embed.js";
 import { Film } from "./film.js";
@@ -18,6 +18,7 @@ import { SCENE, STEPS } from "./worlds.js";
 
 const MOST_TICKS_MS = 22; // of a frame; ticks that do not fit are dropped
 const WORDS_MS = 100;     // between two changes of words
+const OVER = "The time is over. Start again to play.";
 
 /** The events of a run without the visitor's last stroke, whose pieces follow each other. */
 function withoutLastStroke({ engine: { events, width }, given }) {
@@ -162,7 +163,7 @@ class Lab {
   mayDraw() {
     const [run] = this.runs;
     if (!isDaily(run) || this.ui.brush !== "rock" || mayPlace(run)) return true;
-    this.toast(run.tick < 2000 ? "All ten rocks are placed." : "The time is over. Start again to play.");
+    this.toast(run.tick < 2000 ? "All ten rocks are placed." : OVER);
     return false;
   }
 
@@ -182,6 +183,7 @@ class Lab {
 
   play(on) {
     if (on && this.question && this.question.said < 0) return this.toast("First say what you expect.");
+    if (on && isOver(this.runs[0])) return this.toast(OVER);
     this.ui.playing = on;
     byId("play").innerHTML = icon(on ? "pause" : "play");
     byId("play").setAttribute("aria-label", on ? "Pause" : "Play");
@@ -209,8 +211,9 @@ class Lab {
   }
 
   advance() {
+    if (isOver(this.runs[0])) return this.play(false);
     for (const run of this.runs) run.advance();
-    if (this.question) settle(this.question, this.runs);
+    return this.question && settle(this.question, this.runs);
   }
 
   frame(now) {

@@ -366,10 +366,22 @@ def test_the_daily_map_is_the_same_for_all_and_its_result_is_a_link(opened):
     assert page.read("lab.runs[0].engine.events.length") == 10
     assert page.tab.inner_text("#toast") == "All ten rocks are placed."
     page.until("lab.runs[0].tick >= 2000")
-    food = page.read("lab.runs[0].total[2000]")
+    page.tab.click("#play")  # refused: the link holds the result
+    page.read("lab.advance()")
+    assert (page.read("lab.runs[0].tick"), page.read("lab.ui.playing")) == (2000, False)
+    food = page.read("lab.runs[0].engine.deliveries")
     assert page.words() == f"{food:,} loads of food.".replace(",", "\u202f")
-    again = opened("#" + page.link())
+    link = page.link()
+    again = opened("#" + link)
     assert again.words() == page.words()
+    assert lab.replay(link).deliveries == food
+    again.visit("copies")
+    again.tab.click("#more summary")
+    again.tab.select_option("#place", "5")  # today's map
+    assert again.words() == "Today\u2019s map. Most food wins."
+    again.tab.fill("#seed", "85")
+    again.tab.press("#seed", "Enter")
+    assert again.words() == "The map of seed 85. Most food wins."
 
 
 @pytest.mark.browser
