@@ -128,7 +128,7 @@ export class Controls {
   }
 
   key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input:not([type=radio]), select, textarea")) return;
+    if (this.lab.training.dialog.open || event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input:not([type=radio]), select, textarea")) return;
     const brush = { r: "rock", f: "food", t: "scent", e: "erase", l: "look" }[event.key.toLowerCase()];
     if (brush) /** @type {HTMLElement} */ (document.querySelector(`#brushes [data-value="${brush}"] input`)).click();
     if (event.key.toLowerCase() === "z") this.lab.undo();

@@ -36,7 +36,7 @@ export class Painter {
     const w = Math.max(1, Math.round(box.width * this.dpr)), h = Math.max(1, Math.round(box.height * this.dpr));
     for (const one of [this.canvas, this.ground, this.things]) [one.width, one.height] = [w, h];
     const margin = 6 * this.dpr, R = e.radius - 1;
-    this.s = Math.min((w - 2 * margin) / (3 * R + 2), (h - 2 * margin) / (2 * ROOT3 * R + 1.9)); // pixels per unit of geometry.js
+    this.s = Math.max(0.1, Math.min((w - 2 * margin) / (3 * R + 2), (h - 2 * margin) / (2 * ROOT3 * R + 1.9))); // pixels per unit of geometry.js
     this.letter = Math.max(10.5 * this.dpr, 1.15 * this.s); // the size of labels
     this.x0 = w / 2; // where the origin of geometry.js is
     this.y0 = h / 2;

@@ -53,7 +53,7 @@ export class Training {
       const words = [...new Set(GRID.map((setting) => wordingOf(name, setting)))];
       return `<label><span>${label}</span><select id="t-${name}">${words.map((word) => `<option>${word}</option>`).join("")}</select></label>`;
     };
-    this.dialog.innerHTML = `<button class="close" aria-label="Close">×</button><h2>One ant, alone</h2>
+    this.dialog.innerHTML = `<button class="close" aria-label="Close">×</button><h2 tabindex="-1" autofocus>One ant, alone</h2>
       <p>The paper trains single ants: ${EPISODES} episodes in a small world, from nothing. Choose a setting, and train ${SEEDS} ants with it; they differ only in their seed. A delivery ends the episode: if it terminates, nothing is worth more after it; if it truncates, ants learn as if it went on.</p>
       <div class="choices">${CHOICES.map(options).join("")}</div>
       <p class="acts"><button id="t-one">Train ${SEEDS} ants</button><button id="t-grid">Train the whole grid: ${many(GRID.length * SEEDS)} ants</button></p>
@@ -62,8 +62,7 @@ export class Training {
     byId("t-one").addEventListener("click", () => this.one());
     byId("t-grid").addEventListener("click", () => this.grid());
     this.dialog.querySelector(".close").addEventListener("click", () => this.dialog.close());
-    this.dialog.showModal();
-    this.lab.play(false);
+    this.dialog.showModal(); // the world waits, see main.js
     this.curves = [];
   }
 

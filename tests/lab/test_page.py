@@ -415,7 +415,11 @@ def test_a_course_page_steers_the_lab_in_a_frame(browser, tmp_path):
 @pytest.mark.browser
 def test_lone_ants_train_in_the_page(opened):
     page = opened()
+    page.read("lab.play(true)")
     page.tab.click("#train")
+    for key in ("f", " "):  # neither draws, nor pauses or closes
+        page.tab.keyboard.press(key)
+    assert page.read("[lab.ui.brush, lab.ui.playing, training.open]") == ["rock", True, True]
     page.read("lab.training.one()")
     text = page.tab.inner_text("#t-results")
     assert text.startswith("100 ants, ")
@@ -423,6 +427,9 @@ def test_lone_ants_train_in_the_page(opened):
     assert len(means) == len(halves) == 50
     assert means[-1] > means[0]  # they learn
     assert all(0 <= half < 20 for half in halves)
+    page.tab.keyboard.press("Escape")
+    tick = page.read("lab.runs[0].tick")
+    page.tab.wait_for_function("(tick) => lab.runs[0].tick > tick", arg=tick)
 
 
 @pytest.mark.browser
@@ -439,14 +446,16 @@ def test_a_film_has_at_most_three_megabytes(opened):
 @pytest.mark.parametrize("address", ["", "#copies", "#bridge", "#daily"])
 def test_nothing_is_cut_off(opened, address):
     page, widths = opened(address), (760, 839, 840, 1200, 1260, 1280, 1366)
-    for width, height in (*SIZES.values(), *((width, 768) for width in widths)):
+    sideways = ((844, 390), (667, 375), (568, 320), (320, 568))
+    for width, height in (*SIZES.values(), *sideways, *((width, 768) for width in widths)):
         page.tab.set_viewport_size({"width": width, "height": height})
         page.read(TWO_FRAMES)
         assert page.read("document.documentElement.scrollWidth") <= width
         bar = "document.querySelector('.bar')"
         assert page.read(f"{bar}.scrollWidth - {bar}.clientWidth") == 0, width
         assert page.read(CUT_OFF) == []
-        if width >= 840:  # the buttons at the end of the panel are on the first screen
+        assert page.read("lab.sides[0].canvas.clientHeight") >= 150, (width, height)
+        if width >= 840 and height >= 600:  # the first screen has the panel's last buttons
             assert page.read("verify.getBoundingClientRect().bottom <= innerHeight"), width
 
 
