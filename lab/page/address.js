@@ -7,7 +7,6 @@ import { QUESTIONS } from "./scenes.js";
 import { many } from "./story.js";
 
 const SAVE_MS = 250;
-const DAMAGED = "This link is damaged. The lab starts anew.";
 const MOST_REPLAY = 200_000; // ticks of a link that are replayed at once
 
 /** The text after "#" that replays the runs up to now; two runs are joined by "~". */
@@ -69,36 +68,37 @@ export class Address {
     return lines;
   }
 
-  /** Open what the address asks for. */
+  /** Open what the address asks for, or the first screen if it is damaged. */
   open(text = location.hash.slice(1)) {
+    try {
+      if (text) this.start(text);
+    } catch (error) {
+      this.lab.begin();
+      this.lab.toast(`${error.name === "URIError" ? "This link is damaged." : error.message} The lab starts anew.`, 6000);
+    }
+  }
+
+  /** Start a question, the daily map, or a link; an error if a text is none of them. */
+  start(text) {
     const { lab } = this, question = QUESTIONS.find((one) => one.id === text);
     if (question) lab.ask(question);
     else if (text === "daily") beginDaily(lab);
-    else if (text) this.replay(text);
+    else this.replay(text.split("~").slice(0, 2).map(partsOf).map(({ code, ...moment }) => ({ ...decode(code), ...moment })));
   }
 
-  /** Play links up to their moment, and compare the states. */
-  replay(text) {
-    const { lab } = this, began = performance.now();
-    let starts;
-    try {
-      starts = text.split("~").slice(0, 2).map((one) => {
-        const { code, tick, hash } = partsOf(one);
-        return { ...decode(code), tick, hash };
-      });
-    } catch (error) {
-      lab.begin();
-      return lab.toast(error.name === "URIError" ? DAMAGED : error.message, 6000);
-    }
+  /** Play links up to their moment, and compare the states if they have hashes. */
+  replay(starts) {
+    const { lab } = this, began = performance.now(), late = starts.some(({ tick }) => tick > MOST_REPLAY);
     lab.begin(starts);
-    if (starts.some(({ tick }) => tick === null || tick > MOST_REPLAY)) {
-      return starts[0].events.length ? lab.toast("This link plays what was drawn.", 5000) : undefined;
+    if (late || starts.some(({ tick }) => tick === null)) {
+      return lab.toast(late ? `This link has more than ${many(MOST_REPLAY)} ticks: it plays from the start.` : starts[0].events.length
+        ? "This link plays what was drawn." : "This link has settings alone: a new run starts with them.", 5000);
     }
     lab.runs.forEach((run, k) => run.skip(starts[k].tick));
     const ms = Math.round(performance.now() - began), wrong = lab.runs.filter((run, k) => starts[k].hash && run.engine.hash() !== starts[k].hash);
     this.replayed = { equal: !wrong.length, ms };
     lab.toast(wrong.length ? `Replayed ${many(starts[0].tick)} ticks, but the state differs: it is ${wrong[0].engine.hash()}.`
-      : `Replayed ${many(starts[0].tick)} ticks in ${many(ms)} ms: the same state, to the last bit.`, 6000);
+      : `Replayed ${many(starts[0].tick)} ticks in ${many(ms)} ms${starts.every(({ hash }) => hash) ? ": the same state, to the last bit" : ""}.`, 6000);
     return lab.controls.show();
   }
 }

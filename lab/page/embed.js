@@ -32,7 +32,7 @@ export class Embed {
       return value;
     };
     const acts = {
-      start: () => (data.scene ? lab.address.open(String(data.scene)) : lab.begin()),
+      start: () => (data.scene ? lab.address.start(String(data.scene)) : lab.begin()),
       say: () => {
         if (!lab.question || lab.question.said >= 0) throw new Error("say: no question is waiting for a prediction.");
         lab.say(number(data.option, 0, lab.question.options.length - 1));
@@ -45,7 +45,10 @@ export class Embed {
         if (!SETTING_KINDS.includes(data.name)) throw new Error(`set: ${data.name} is not one of ${SETTING_KINDS.join(", ")}.`);
         lab.set(data.name, number(data.value, 0, 10_000));
       },
-      strokes: () => data.strokes.forEach((stroke) => this.draw(stroke)),
+      strokes: () => {
+        if (!Array.isArray(data.strokes)) throw new Error("strokes: `strokes` is a list of { do, reach, path }.");
+        data.strokes.forEach((stroke) => this.draw(stroke));
+      },
       skip: () => { for (let k = number(data.ticks, 0, MOST_TICKS); k >= 1; k--) lab.advance(); },
       facts: () => {
         clearInterval(this.telling);
@@ -59,7 +62,7 @@ export class Embed {
   draw({ do: brush, reach, path }) {
     const { engine } = this.lab.runs[0];
     if (!Object.hasOwn(STROKES, brush) || !(reach >= 0 && reach <= 7)) throw new Error(`strokes: \`do\` is one of ${Object.keys(STROKES).join(", ")}, \`reach\` 0 to 7.`);
-    if (!path.length || !path.every(([q, r]) => engine.exists(q, r))) throw new Error("strokes: a path has cells [q, r] of the world.");
+    if (!Array.isArray(path) || !path.length || !path.every(([q, r]) => engine.exists(q, r))) throw new Error("strokes: a path has cells [q, r] of the world.");
     const cells = path.flatMap((cell, k) => (k ? lineTo(path[k - 1], cell) : [cell]));
     this.lab.act({ do: brush, reach, path: cells.map(([q, r]) => engine.at(q, r)) });
   }

@@ -80,13 +80,14 @@ export function encode(scene, events) {
   return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
 }
 
+const damaged = () => new Error("This link is damaged.");
+
 /**
  * What a code has; an error with one sentence if it is damaged.
  * @param {string} code
  * @returns {{ scene: Scene, events: Change[] }}
  */
 export function decode(code) {
-  const damaged = () => new Error("This link is damaged. The lab starts anew.");
   if (!/^[\w-]+$/.test(code) || code.length % 4 === 1) throw damaged();
   const raw = atob(code.replaceAll("-", "+").replaceAll("_", "/"));
   let at = 0;
@@ -151,8 +152,9 @@ export const linkOf = (engine) => `${encode(engine.first, engine.events)};${engi
 /** Three lines of Python that replay it and print the hash. @param {any} engine */
 export const pythonOf = (engine) => `from taichi_ants import replay\nvisit = replay("${linkOf(engine)}")\nprint(visit.hash)  # ${engine.hash()}`;
 
-/** The parts of such a text: code, and tick and hash if it has them. @param {string} text */
+/** The parts of such a text: code, and tick and hash if it has them; an error like that of `decode`. @param {string} text */
 export function partsOf(text) {
   const [code, tick = "", hash = ""] = decodeURIComponent(text.slice(text.indexOf("#") + 1)).split(";");
-  return { code, tick: /^\d{1,7}$/.test(tick) ? Number(tick) : null, hash };
+  if (!/^\d{0,7}$/.test(tick)) throw damaged();
+  return { code, tick: tick ? Number(tick) : null, hash };
 }

@@ -16,6 +16,7 @@ from taichi_ants import lab, runtime
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "docs" / "lab.html"
+START = "AQAPVUAeZIQHAQrYBAEC"  # the code of the first screen
 QUESTIONS = ("never", "copies", "home", "bridge", "wall", "halves")
 SIZES = {"phone": (390, 844), "tablet": (1024, 768), "desk": (1440, 900)}
 TWO_FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
@@ -344,7 +345,7 @@ def test_a_browser_without_simd_says_what_it_needs(browser):
 @pytest.mark.browser
 def test_a_damaged_link_gives_a_sentence_and_the_first_screen(opened):
     page = opened("#xx")
-    for address in ("", "%%%", "AQAPVUAeZIQH;3;00", "never;5", "~~"):
+    for address in ("", "%%%", "AQAPVUAeZIQH;3;00", f"{START};-5", f"{START};abc", "never;5", "~~"):
         if address:
             page.read("document.querySelector('#toast').textContent = ''")
             page.read("lab.begin([{ scene: { ...lab.runs[0].engine.scene, seed: 1 } }])")
@@ -352,6 +353,20 @@ def test_a_damaged_link_gives_a_sentence_and_the_first_screen(opened):
             page.tab.wait_for_function("document.querySelector('#toast').textContent")
         assert re.fullmatch(r"This link .+\.", page.tab.inner_text("#toast"))
         assert page.read("lab.runs[0].engine.scene.seed") == 85
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("", r"This link has settings alone: a new run starts with them\."),
+        (";999999", ".+: it plays from the start."),
+        (";50", r"Replayed 50 ticks in \d+ ms\."),  # no hash, so nothing was compared
+    ],
+)
+def test_a_link_says_what_it_does(opened, more, said):
+    page = opened(f"#{START}{more}")
+    assert re.fullmatch(said, page.tab.inner_text("#toast"))
 
 
 @pytest.mark.browser
@@ -406,6 +421,9 @@ def test_a_course_page_steers_the_lab_in_a_frame(browser, tmp_path):
     assert send(lab="set", name="nest", value=1)["message"].startswith("set: nest is not one of")
     assert send(lab="speed", value=100)["message"] == "speed: 100 is not between 0.1 and 64."
     assert send(lab="fly")["message"].startswith("fly is not one of")
+    assert send(lab="start", scene="xx")["message"] == "This link is damaged."
+    assert send(lab="strokes", strokes="x")["message"].startswith("strokes: `strokes` is a list")
+    assert send(lab="facts")["sides"][0]["tick"] == tick  # nothing has changed
     assert send(lab="start", scene="copies")["story"] == "ask-copies"
     assert send(lab="say", option=9)["message"] == "say: 9 is not between 0 and 2."
     assert send(lab="say", option=2)["story"] == "run-copies"
