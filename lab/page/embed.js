@@ -45,10 +45,7 @@ export class Embed {
         if (!SETTING_KINDS.includes(data.name)) throw new Error(`set: ${data.name} is not one of ${SETTING_KINDS.join(", ")}.`);
         lab.set(data.name, number(data.value, 0, 10_000));
       },
-      strokes: () => {
-        if (!Array.isArray(data.strokes)) throw new Error("strokes: `strokes` is a list of { do, reach, path }.");
-        data.strokes.forEach((stroke) => this.draw(stroke));
-      },
+      strokes: () => [data.strokes ?? ""].flat().forEach((stroke) => this.draw(stroke)),
       skip: () => { for (let k = number(data.ticks, 0, MOST_TICKS); k >= 1; k--) lab.advance(); },
       facts: () => {
         clearInterval(this.telling);

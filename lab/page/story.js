@@ -36,13 +36,13 @@ export function storyOf(run) {
   }
   if (facts.firstHome >= 0) {
     const several = run.engine.deliveries > 1;
-    return { id: `home${several}`, head: several ? "They bring food home." : "One brought food home.",
+    return { id: several ? "home" : "home-one", head: several ? "They bring food home." : "One brought food home.",
              sub: `The first, after ${bold(seconds(facts.firstHome))}: 10 points. `
                + `What one ant learns, all ${many(run.engine.ants)} know.` };
   }
   if (facts.firstFood >= 0) {
     const { looks, ants } = run.engine, alone = looks.subarray(0, ants).filter((look) => look & 1).length < 2;
-    return { id: `food${alone}`, head: alone ? "One has found food." : "They have found food.",
+    return { id: alone ? "food-one" : "food", head: alone ? "One has found food." : "They have found food.",
              sub: `The first by chance, after ${bold(seconds(facts.firstFood))}. Picking it up pays 3 points, bringing it home 10. `
                + "What is the nest for? They have to find out." };
   }
