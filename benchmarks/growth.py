@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from measuring import FIGURES, Work, machine, pace, show
+from measuring import FIGURES, Work, count_in_powers, machine, pace, show
 from systems.ours import SARSA
 
 from taichi_ants import Task, TrainingConfig, World, runtime, train, worlds
@@ -261,7 +261,7 @@ def draw(found: Paces) -> None:
                     point = (place, float(np.median(steps)), steps.min(), steps.max())
                     lines.setdefault(label, []).append(point)
             draw_lines(axes, lines)
-            axes.set_xscale("log")
+            count_in_powers(axes.xaxis)
             axes.set(title=one.of.capitalize(), xlabel=f"number of {one.of}\n(steps {one.step})")
             axes.set_ylim(0)
         panels[0].set_ylabel("million steps per second")

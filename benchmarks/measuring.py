@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from taichi_ants import runtime
 
@@ -36,6 +37,13 @@ def machine(packages: Sequence[str]) -> str:
         f"{runtime.processor()}, {runtime.available_threads()} processors, {platform.system()}, "
         f"Python {platform.python_version()}, {', '.join(versions)}."
     )
+
+
+def count_in_powers(axis: Any) -> None:
+    """Make an axis logarithmic, with labels such as 10⁴; the style of figures has no formulas."""
+    raised = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+    axis.axes.set_xscale("log")
+    axis.set_major_formatter(lambda value, _: "10" + f"{math.log10(value):.0f}".translate(raised))
 
 
 def pace(work: Work, seconds: float) -> tuple[float, float]:

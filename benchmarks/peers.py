@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from typing import NamedTuple
 
 import numpy as np
-from measuring import FIGURES, Work, machine, pace, show
+from measuring import FIGURES, Work, count_in_powers, machine, pace, show
 
 from taichi_ants.analysis import style
 from taichi_ants.analysis.tables import Table, figure, interval, thousands
@@ -196,7 +196,8 @@ def draw(found: dict[str, Paces]) -> None:
             axes.set_yticks(range(len(paces)), [system.name for system in paces])
             axes.set(title=name, ylim=(len(paces) - 0.5, -0.5))
             axes.grid(visible=False, axis="y")
-        panels[-1].set(xlabel="steps per second", xscale="log")
+        panels[-1].set(xlabel="steps per second")
+        count_in_powers(panels[-1].xaxis)
         title = "Steps per second on one machine"
         caption = "Medians, with the lowest and highest. Compare within a panel."
         style.frame(drawn, title, caption, style.legend_entries(panels))
