@@ -9,6 +9,7 @@ systems, run `pip install -e ".[bench]"`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from typing import NamedTuple
@@ -150,7 +151,7 @@ def measured(sizes: Sizes, rounds: int, seconds: float) -> dict[str, Paces]:
 
 
 def tables(found: dict[str, Paces], groups: Groups, sizes: Sizes, rounds: int) -> list[Table]:
-    """Return a table for each group, and one with notes on the machine and skipped systems."""
+    """Return a table for each group, the last with notes on the machine and skipped systems."""
     words = {name: thousands(size) for name, size in sizes._asdict().items()}
     made = []
     for name, paces in found.items():
@@ -172,8 +173,7 @@ def tables(found: dict[str, Paces], groups: Groups, sizes: Sizes, rounds: int) -
         if missing(one)
     ]
     about = f"Medians of {rounds} rounds. {machine(_PACKAGES)}"
-    made.append(Table("", [], [], [about, *lacking]))
-    return made
+    return [*made[:-1], replace(made[-1], notes=[about, *lacking])]
 
 
 def draw(found: dict[str, Paces]) -> None:
