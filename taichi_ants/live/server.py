@@ -315,7 +315,7 @@ class SessionServer:
                 self._jobs[LOAD] = Replay(Session.replay(log), log.steps)
             case {"do": "back"}:  # return to the session before the present one
                 if self._previous is None:
-                    raise AntsError("there is no session before this one; continue with this one.")
+                    raise AntsError("there is no earlier session; continue with this one.")
                 self._begin(self._previous, comes_back=True)
             case {"do": "begin", "chosen": chosen}:
                 self._begin(await self._work(Session, self.choices.setup(chosen)))

@@ -10,7 +10,7 @@ from taichi_ants.measures.measure import MEASURES
 
 @pytest.fixture
 def sweep(tmp_path, capsys, monkeypatch):
-    """Calls the command on a file of this text, in a folder of its own."""
+    """Calls the command on a file of this text, in a new folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(MEASURES, "yours", {})
 

@@ -47,7 +47,7 @@ def test_pettingzoo_finds_no_fault(name):
 
 
 def test_agents_are_the_living_ants_by_number():
-    """Who lives, what each observes, earns and does, until the end of two episodes.
+    """Compare the living ants, and what each observes, earns and does, for two episodes.
 
     Ants die with food, and others are born into their slots. `test_colony.py` compares all that
     they do with the reference.

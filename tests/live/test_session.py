@@ -94,7 +94,7 @@ def _registered():
 
 
 def assert_sound(interventions: Interventions) -> None:
-    """What holds in every colony at the end of a tick."""
+    """Check what must hold in every colony at the end of a tick."""
     colony = interventions.colony
     arrays, world = colony.arrays, colony.arrays["worlds"][:, 0]
     taken = arrays["stage"] != Stage.VACANT

@@ -1,4 +1,4 @@
-"""What is refused: in one sentence, with the words that a test expects."""
+"""A check that wrong input is refused in one sentence, with the words that a test expects."""
 
 from __future__ import annotations
 

@@ -193,7 +193,7 @@ def is_taken(c, v, ant):
     return trait(c.stage, ant) != layout.Stage.VACANT if v.slots_matter else True
 
 
-# What all ants do between two ticks.
+# What happens to all ants between two ticks.
 ONCE = {
     "begin": Phase(ANTS, learning.begin),
     "see_interventions": Phase(ANTS, learning.see_interventions),

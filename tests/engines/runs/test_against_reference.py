@@ -22,7 +22,7 @@ from taichi_ants import (
     trace_training,
     train,
 )
-from taichi_ants.engines.runs import engine
+from taichi_ants.engines.runs import engine, kernels
 from taichi_ants.settings import declared
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import Event
@@ -198,6 +198,18 @@ def test_many_runs_equal_single_ones(learner, observation, deposit, choice, nois
             for name in ("returns", "steps", "deliveries"):
                 assert np.array_equal(getattr(rolled, name)[s], getattr(once, name))
     assert 0 < drawn < 4  # with ties, rollouts of a table differ
+
+
+@pytest.mark.parametrize(
+    ("learner", "gathers", "together"),
+    [("q_learning", True, True), ("q_learning", False, False), ("dyna_q", True, False)],
+)
+def test_runs_share_a_task_only_where_that_is_faster(learner, gathers, together, monkeypatch):
+    lanes, make = set(), kernels.run_kernel
+    monkeypatch.setattr(engine, "GATHERS", gathers)
+    monkeypatch.setattr(kernels, "run_kernel", lambda *form: lanes.add(form[3]) or make(*form))
+    train(paper(), random_config(0, learner), range(20 * runtime.start().threads), 1, 2)
+    assert lanes == {kernels.LANES if together else 1}
 
 
 @pytest.mark.parametrize(("observation", "deposit"), [("paper", "set"), ("five_cells", "add")])

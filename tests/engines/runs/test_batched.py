@@ -16,7 +16,7 @@ from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import GIVE, PICK_UP, Event, Reason
 from taichi_ants.worlds import World
 
-# Each is a kernel of its own: observation, deposit, view, noise.
+# Each needs another kernel: observation, deposit, view, noise.
 KERNELS = [
     ("paper", "set", "half", NO_NOISE),
     ("six_cells", "add", "strongest", NO_NOISE),
