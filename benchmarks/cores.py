@@ -2,20 +2,21 @@
 
 The rows that many threads change most come first. A colony is measured twice: its kernels alone
 with each number of threads, and `Colony.tick`, which sorts ants and chooses the number of threads
-itself, up to all. All is measured in turn, several times, by the wall clock; tables have medians.
+itself, up to each number. All is measured several times, by the wall clock; tables have medians.
 The command takes less than five minutes. On a machine with fewer processors it has fewer columns.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from measuring import machine, show
 
 from taichi_ants import Colony, Task, TrainingConfig, runtime, train, worlds
-from taichi_ants.analysis.tables import MISSING, Table, figure, thousands
+from taichi_ants.analysis.tables import Table, figure, thousands
 from taichi_ants.envs.forage import HexForageVectorEnv
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import foraging
@@ -44,36 +45,43 @@ def colony_of(ants: int, n_worlds: int) -> Colony:
     return colony
 
 
-def colony_works(ants: int, n_worlds: int) -> Iterator[tuple[str, Work]]:
-    """Yield the kernels alone and `tick`."""
+def kernels(ants: int, n_worlds: int) -> Work:
+    """Return work: ticks without sorting, divided among exactly the given number of threads."""
     colony = colony_of(ants, n_worlds)
-    steps = ants * n_worlds
-    ticks = max(2, _STEPS // steps)
+    ticks = ticks_of(ants, n_worlds)
 
-    def kernels(threads: int) -> float:
+    def work(threads: int) -> float:
         parts = threads
         if colony.schedule == "by_world":
             parts = threads * -(-n_worlds // threads)
 
-        def work() -> int:
-            several = ticks * threads
-            colony._launch_parts("ticks", several, parts, threads)
-            return several * steps
+        def several() -> int:
+            colony._launch_parts("ticks", ticks * threads, parts, threads)
+            return ticks * threads * ants * n_worlds
 
-        return pace_of(work)
+        return pace_of(several)
 
-    def tick(threads: int) -> float:
-        def work() -> int:
-            several = 4 * ticks * threads  # long enough to try numbers of threads
-            colony.tick(several)
-            return several * steps
+    return work
 
-        return pace_of(work)
 
-    name = f"{thousands(ants)} ants"
-    name += f", {thousands(n_worlds)} worlds" * (n_worlds > 1)
-    yield f"{name}: kernels", kernels
-    yield f"{name}: `tick`", tick
+def tick(ants: int, n_worlds: int) -> Work:
+    """Return work: `Colony.tick`, long enough to try numbers of threads."""
+    colony = colony_of(ants, n_worlds)
+    ticks = 2 * ticks_of(ants, n_worlds)
+
+    def work(threads: int) -> float:
+        def several() -> int:
+            colony.tick(ticks * threads)
+            return ticks * threads * ants * n_worlds
+
+        return pace_of(several)
+
+    return work
+
+
+def ticks_of(ants: int, n_worlds: int) -> int:
+    """Return the number of ticks in one measurement with one thread."""
+    return max(2, _STEPS // (ants * n_worlds))
 
 
 def training(threads: int) -> float:
@@ -112,22 +120,34 @@ def measured(rounds: int) -> dict[str, dict[int, list[float]]]:
     """Return million steps/s by row and number of threads."""
     found: dict[str, dict[int, list[float]]] = {}
     counts = numbers()
-    runtime.start(counts[-1])
+    restarting = {"training, 4 096 runs": lambda: training, "random rollouts, 65 536": rollouts}
     with progress_bar("Measuring") as progress:
-        for n, size in enumerate(COLONIES):
-            for name, work in colony_works(*size):
-                chosen = name.endswith("`tick`")
-                found[name] = measure(work, counts[-1:] if chosen else counts, rounds)
-            progress((n + 1) / (len(COLONIES) + 2))
-        makers = {"training, 4 096 runs": lambda: training, "random rollouts, 65 536": rollouts}
-        for name, make in makers.items():
-            rows: dict[int, list[float]] = {}
-            for count in counts:  # Taichi restarts
-                runtime.start(count)
-                rows |= measure(make(), [count], rounds)
-            found[name] = rows
+        for size in COLONIES:
+            name = name_of(*size)
+            runtime.start(counts[-1])
+            found[f"{name}: kernels"] = measure(kernels(*size), counts, rounds)
+            found[f"{name}: `tick`"] = restarted(partial(tick, *size), counts, rounds)
+            progress(len(found) / (2 * len(COLONIES) + 2))
+        for name, make in restarting.items():
+            found[name] = restarted(make, counts, rounds)
             progress(len(found) / (2 * len(COLONIES) + 2))
     return found
+
+
+def name_of(ants: int, n_worlds: int) -> str:
+    """Return the name of a colony in the table."""
+    return f"{thousands(ants)} ants" + f", {thousands(n_worlds)} worlds" * (n_worlds > 1)
+
+
+def restarted(
+    make: Callable[[], Work], counts: Sequence[int], rounds: int
+) -> dict[int, list[float]]:
+    """Return paces of new work by number of threads, with which Taichi restarts."""
+    paces: dict[int, list[float]] = {}
+    for count in counts:
+        runtime.start(count)
+        paces |= measure(make(), [count], rounds)
+    return paces
 
 
 def measure(work: Work, counts: Sequence[int], rounds: int) -> dict[int, list[float]]:
@@ -140,8 +160,7 @@ def table(found: dict[str, dict[int, list[float]]], rounds: int) -> Table:
     """Return a table with a row for each work and a column for each number of threads."""
     counts, rows = numbers(), []
     for name, paces in found.items():
-        shown = [figure(np.median(paces[n])) if n in paces else MISSING for n in counts]
-        rows.append([name, *shown])
+        rows.append([name, *(figure(np.median(paces[n])) for n in counts)])
     columns = ["M steps/s", *(f"{n} thread{'s' * (n > 1)}" for n in counts)]
     about = f"Medians of {rounds} rounds. {machine(('taichi', 'numpy'))}"
     return Table("With several threads", columns, rows, [about])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import statistics
 import time
 from collections.abc import Iterator, Sequence
 from functools import cached_property, partial
@@ -26,7 +27,7 @@ _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # checks of a thread at a barrier, which take at least half a second
 # Trials of another number of threads: seconds in a launch, the share of all time, and the log of
 # the gain in speed for which the number changes.
-_TRIAL_SECONDS, _TRIAL_SHARE, _LEAST_GAIN = 0.01, 0.03, 0.02
+_TRIAL_SECONDS, _TRIAL_SHARE, _LEAST_GAIN = 0.01, 0.03, 0.03
 
 
 class ThreadChoice:
@@ -36,7 +37,9 @@ class ThreadChoice:
     programs use the processors. So the choice starts with all threads, and tries the next lower and
     the next higher number in turn. A trial is two short launches with the other number and two with
     the present number. The first of each does not count, because threads that have rested wake up
-    late. The launches with the other number take at most `_TRIAL_SHARE` of all time.
+    late. Nor does a pause of a thread in the last one, see `recent`. The launches with the other
+    number take at most `_TRIAL_SHARE` of all time, except the first one with each number: if other
+    programs use the processors, fewer threads can be many times faster.
     """
 
     def __init__(self, most: int = 1) -> None:
@@ -44,6 +47,7 @@ class ThreadChoice:
         self.at = len(self.numbers) - 1  # the place of the present number
         self.gains: dict[int, float] = {}  # by place: log of the speed relative to the present one
         self.seconds_per_tick: dict[int, float] = {}  # by number of threads, the last ones
+        self.recent: list[float] = []  # the last ones with the present number
         self.allowance = 0.0  # seconds that trials may take by now
         self._step = 1  # to the neighbour that was tried last, then the other one
         self._pending: list[int] = []  # the places of a trial's launches that are left
@@ -58,7 +62,7 @@ class ThreadChoice:
         if not self._pending and pace is not None and most > 1:
             step = -self._step if 0 <= self.at - self._step < len(self.numbers) else self._step
             other, self._ticks = self.at + step, max(1, min(ticks, round(_TRIAL_SECONDS / pace)))
-            expected = self.seconds_per_tick.get(self.numbers[other], 2 * pace)
+            expected = self.seconds_per_tick.get(self.numbers[other], pace / 4)
             if 2 * self._ticks * expected <= self.allowance:
                 self._pending, self._step = [other, other, self.at, self.at], step
         if self._pending:
@@ -67,17 +71,20 @@ class ThreadChoice:
 
     def note(self, ticks: int, threads: int, seconds: float) -> None:
         """Take notice of the time of a launch that followed the last plan."""
-        self.seconds_per_tick[threads] = seconds / ticks
+        pace = seconds / ticks
         self.allowance += _TRIAL_SHARE * seconds
         if len(self._pending) > 2:
-            self.allowance -= seconds
-            self._tried = seconds / ticks
-        elif len(self._pending) == 1:
+            self.allowance -= seconds if threads in self.seconds_per_tick else 0.0
+            self._tried = pace
+        else:
+            self.recent = [*self.recent[-8:], pace]
+        if len(self._pending) == 1:
             other = self.at + self._step
-            gain = math.log(seconds / ticks / self._tried)
+            gain = math.log(min(pace, statistics.median(self.recent)) / self._tried)
             self.gains[other] = gain + self.gains.get(other, 0.0) / 2
             if self.gains[other] > _LEAST_GAIN:
-                self.at, self.gains = other, {}
+                self.at, self.gains, self.recent = other, {}, [self._tried]
+        self.seconds_per_tick[threads] = pace
         self._pending = self._pending[1:]
 
 
