@@ -370,7 +370,7 @@ MUTATIONS = [
         "words(cells).argsort()",
         "tests/worlds",
     ),
-    ("worlds/world.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
+    ("worlds/world.py", "offsets).ravel()", "offsets[:5]).ravel()", "tests/worlds"),
     ("grid/hexgrid.py", "difference > -y", "difference >= -y", "tests/grid"),
     # Measures and results.
     (
