@@ -11,6 +11,7 @@ from taichi_ants import (
     Rewards,
     Task,
     TrainingConfig,
+    arguments,
     evaluate,
     learners,
     offline,
@@ -135,6 +136,17 @@ def test_several_tables_are_counted_where_one_is_wanted() -> None:
 
 def test_whole_numbers_of_numpy_are_whole_numbers() -> None:
     assert len(rollout(WORLD, TABLE, max_steps=SCALAR)) == 5
+
+
+def test_too_little_memory_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*given: object) -> None:
+        raise MemoryError("Unable to allocate 64.0 GiB for an array")
+
+    monkeypatch.setattr(arguments, "checked_seeds", fails)
+    calls = (train, CONFIG, 0), (evaluate, TABLE), (record,), (Colony, None, CONFIG)
+    for call, *given in calls:
+        with pytest.raises(AntsError, match=r"memory for so many .*; choose smaller numbers\.$"):
+            call(WORLD, *given)
 
 
 def test_no_message_fills_a_screen(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from taichi_ants.errors import AntsError
@@ -25,8 +25,8 @@ class TrainingConfig(Settings, path="training"):
     does not change. If `initial_q` is larger than all possible returns ("optimistic"), ants try all
     actions. `hyperparameters` are those of the learner, sorted (name, number) pairs. Give them as a
     mapping or as keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. All others have the
-    defaults of `taichi_ants.learners.get(name).hyperparameters()`. Training, not this class, checks
-    that the learner exists and has these hyperparameters.
+    defaults of `taichi_ants.learners.get(name).hyperparameters()`. Training checks that the learner
+    exists, and its hyperparameters if you register it after this call.
 
     >>> TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=3).planning_steps
     3
@@ -68,7 +68,10 @@ class TrainingConfig(Settings, path="training"):
     if not TYPE_CHECKING:
 
         def __new__(cls, *values: Any, **named: Any) -> TrainingConfig:
-            return object.__new__(cls)  # further names are hyperparameters
+            # First, because Python would only say that the setting with a misspelt name is missing.
+            more = {n: v for n, v in named.items() if n not in cls.__match_args__}
+            _checked_hyperparameters(*values[:1] or [named.get("learner")], more)
+            return object.__new__(cls)
 
     def __init__(
         self,
@@ -90,7 +93,7 @@ class TrainingConfig(Settings, path="training"):
             object.__setattr__(self, setting.name, values[setting.name])
         self.check()
         pairs = {**table_of("training.hyperparameters", hyperparameters), **more}
-        plain = {n: v.item() if getattr(v, "size", 0) == 1 else v for n, v in pairs.items()}
+        plain = _checked_hyperparameters(learner, pairs)
         object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
 
     @classmethod
@@ -127,12 +130,10 @@ class TrainingConfig(Settings, path="training"):
         >>> config.replace(learner="q_learning").learner
         'q_learning'
         """
-        common = [setting.name for setting in declared(TrainingConfig)]
-        more = {name: value for name, value in changes.items() if name not in common}
-        same = changes.get("learner", self.learner) == self.learner
+        common = {s.name: changes.pop(s.name) for s in declared(type(self)) if s.name in changes}
+        same = common.get("learner", self.learner) == self.learner
         kept = dict(self.hyperparameters) if same else {}
-        changed = super().replace(**{n: value for n, value in changes.items() if n in common})
-        return replace(changed, hyperparameters=tuple({**kept, **more}.items()))
+        return super().replace(**common, hyperparameters={**kept, **changes})
 
     def next_learning_rate(self, rate: float) -> float:
         """Return the learning rate of the episode after one with learning rate `rate`."""
@@ -150,6 +151,16 @@ class TrainingConfig(Settings, path="training"):
     def as_dict(self) -> dict[str, Any]:
         """Return the settings as names and numbers; `TrainingConfig(**facts)` reads them."""
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
+
+
+def _checked_hyperparameters(learner: Any, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return hyperparameters as Python's numbers; AntsError if a registered learner refuses one."""
+    from taichi_ants.learners import registry  # imports this module
+
+    plain = {n: v.item() if getattr(v, "size", 0) == 1 else v for n, v in given.items()}
+    if plain and isinstance(learner, str) and learner in registry.names():
+        registry.hyperparameters_of(learner, plain)
+    return plain
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,13 @@ own learner, call `register` from a plugin file.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from importlib import import_module
+from typing import Any
 
 from taichi_ants.errors import AntsError, expect, unusable
-from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.registry import Registry
 from taichi_ants.settings import declared, not_a_setting
@@ -76,10 +78,15 @@ def with_hyperparameters(config: TrainingConfig) -> TrainingConfig:
     Raises AntsError if the learner or a hyperparameter does not exist, or a value is not allowed.
     """
     expect("the configuration", config, TrainingConfig)
-    kind = get(config.learner).hyperparameters
+    complete = hyperparameters_of(config.learner, dict(config.hyperparameters))
+    return replace(config, hyperparameters=tuple(asdict(complete).items()))
+
+
+def hyperparameters_of(learner: str, given: Mapping[str, Any]) -> Hyperparameters:
+    """Return the hyperparameters of a learner, of which some are given; raises as above."""
+    kind = get(learner).hyperparameters
     known = [setting.name for setting in (*declared(kind), *declared(TrainingConfig))]
-    for name, _ in config.hyperparameters:
+    for name in given:
         if name not in known[: len(declared(kind))]:
-            raise AntsError(f"`training.{name}` {not_a_setting(name, known, config.learner)}")
-    hyperparameters = kind(**dict(config.hyperparameters))
-    return replace(config, hyperparameters=tuple(asdict(hyperparameters).items()))
+            raise AntsError(f"`training.{name}` {not_a_setting(name, known, learner)}")
+    return kind(**given)
