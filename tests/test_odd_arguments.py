@@ -14,7 +14,9 @@ from taichi_ants import (
     arguments,
     evaluate,
     learners,
+    measures,
     offline,
+    plot,
     record,
     rendering,
     rollout,
@@ -78,6 +80,12 @@ ODD = {
         Colony(WORLD, None, None, range(3), 2, sharing="frozen"), RAGGED
     ),
     "two runs": lambda _: rollout(WORLD, train(WORLD, CONFIG, range(2), 1)),
+    "measures": lambda colony: colony.run(1, 1, measures=5),
+    "a measure's snapshot": lambda colony: measures.get("deliveries")(colony),
+    "who is changed": lambda _: Interventions(None),
+    "a model's data": lambda _: offline.EmpiricalModel.of(None, np.ones((1, 1))),
+    "where walks start": lambda _: WORLD.walkable([10**12]),
+    "no results": lambda _: plot({}),
     "two policies": lambda _: rollout(WORLD, np.zeros((2, 128, 5))),
     "a world's name": lambda _: places.registry.check_seed_counts(LONG),
 }

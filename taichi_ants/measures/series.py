@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_whole
+from taichi_ants.errors import AntsError, checked_whole, entries_of, refuse
 from taichi_ants.measures.measure import Measure, get
 from taichi_ants.records import Record
 
@@ -56,7 +56,9 @@ class SeriesRecorder:
     """
 
     def __init__(self, measures: Any = (), every: int | None = None) -> None:
-        listed = [measures] if isinstance(measures, (str, Measure)) else measures
+        listed = [measures] if isinstance(measures, (str, Measure)) else entries_of(measures)
+        if listed is None:
+            refuse("measures", measures, "the name of a measure, a Measure, or a list of them")
         self.measures = list({measure.name: measure for measure in map(get, listed)}.values())
         for measure in self.measures:
             measure.check_state("measures")
