@@ -71,6 +71,8 @@ class Snapshot(Record):
         counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers. Also
             `nest_deliveries`, `food_deliveries` and `caste_deliveries`, int32 (nests or kinds of
             food or castes,).
+        names: The names of the kinds of food and of the castes, at "food" and "caste"; empty if the
+            task does not name any.
         world: The world at the start of the episode; None if unknown.
     """
 
@@ -91,6 +93,7 @@ class Snapshot(Record):
     of_ants: Mapping[str, np.ndarray] = field(default_factory=dict)
     fields: Mapping[str, np.ndarray] = field(default_factory=dict)
     counts: Mapping[str, Any] = field(default_factory=dict)
+    names: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     world: World | None = None
 
     def __getattr__(self, name: str) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -64,13 +64,15 @@ class TrainingConfig(Settings, path="training"):
         Setting("action values before learning; high values make ants try every action"),
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
+    # Raises AntsError if a learner is registered, but lacks hyperparameters; set by the registry.
+    _check_learner: ClassVar[Callable[[Any, Mapping[str, Any]], None]]
 
     if not TYPE_CHECKING:
 
         def __new__(cls, *values: Any, **named: Any) -> TrainingConfig:
             # First, because Python would only say that the setting with a misspelt name is missing.
             more = {n: v for n, v in named.items() if n not in cls.__match_args__}
-            _checked_hyperparameters(*values[:1] or [named.get("learner")], more)
+            cls._check_learner(*values[:1] or [named.get("learner")], _plain(more))
             return object.__new__(cls)
 
     def __init__(
@@ -93,7 +95,7 @@ class TrainingConfig(Settings, path="training"):
             object.__setattr__(self, setting.name, values[setting.name])
         self.check()
         pairs = {**table_of("training.hyperparameters", hyperparameters), **more}
-        plain = _checked_hyperparameters(learner, pairs)
+        TrainingConfig._check_learner(learner, plain := _plain(pairs))
         object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
 
     @classmethod
@@ -153,14 +155,9 @@ class TrainingConfig(Settings, path="training"):
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
 
 
-def _checked_hyperparameters(learner: Any, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return hyperparameters as Python's numbers; AntsError if a registered learner refuses one."""
-    from taichi_ants.learners import registry  # imports this module
-
-    plain = {n: v.item() if getattr(v, "size", 0) == 1 else v for n, v in given.items()}
-    if plain and isinstance(learner, str) and learner in registry.names():
-        registry.hyperparameters_of(learner, plain)
-    return plain
+def _plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Return numbers of NumPy as those of Python."""
+    return {n: v.item() if getattr(v, "size", 0) == 1 else v for n, v in numbers.items()}
 
 
 @dataclass(frozen=True)

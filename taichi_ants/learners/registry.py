@@ -90,3 +90,11 @@ def hyperparameters_of(learner: str, given: Mapping[str, Any]) -> Hyperparameter
         if name not in known[: len(declared(kind))]:
             raise AntsError(f"`training.{name}` {not_a_setting(name, known, learner)}")
     return kind(**given)
+
+
+def _check_learner(learner: Any, given: Mapping[str, Any]) -> None:
+    if given and isinstance(learner, str) and learner in names():
+        hyperparameters_of(learner, given)
+
+
+TrainingConfig._check_learner = staticmethod(_check_learner)
