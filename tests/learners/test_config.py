@@ -47,7 +47,8 @@ def test_hyperparameters_are_those_of_the_learner(learner, name, value, says):
     refused(says, TrainingConfig, learner, **{name: value})  # not what else is missing
 
 
-def test_hyperparameters_of_a_learner_that_is_registered_later_are_checked_in_use():
+def test_hyperparameters_of_a_learner_that_is_registered_later_are_checked_in_use(monkeypatch):
+    monkeypatch.setattr(learners.registry.LEARNERS, "yours", {})
     config = TrainingConfig("later", 0.1, 0.9, 0.3, 0.99, n_steps=3)
     complete = learners.registry.with_hyperparameters
     refused("there is no learner 'later'; choose one of q_learning, ", complete, config)
