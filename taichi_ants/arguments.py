@@ -1,7 +1,5 @@
 """Arguments that several functions take, checked once; kernels assume valid input."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence, Sized
 from numbers import Real

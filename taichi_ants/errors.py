@@ -206,6 +206,6 @@ def expect(name: str, value: object, *kinds: type) -> None:
 
 
 _PLAIN = {"str": "text", "NoneType": "None", "ndarray": "an array", "PathLike": "a path"}
-_PLAIN |= {"Mapping": "a mapping of names to values"}
+_PLAIN |= {"Mapping": "a mapping of names to values", "Iterable": "a list"}
 _PLAIN |= {"World": "a World, such as worlds.paper()"}
 _PLAIN |= {"Tidy": "a result of Colony.run, train or evaluate"}

@@ -13,8 +13,6 @@ because each can be too short. A bootstrap of few seeds never exceeds its most e
 the t interval is a point if the middle half consists of ties.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import NamedTuple

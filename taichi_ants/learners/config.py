@@ -64,15 +64,14 @@ class TrainingConfig(Settings, path="training"):
         Setting("action values before learning; high values make ants try every action"),
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
-    # Raises AntsError if a learner is registered, but lacks hyperparameters; set by the registry.
-    _check_learner: ClassVar[Callable[[Any, Mapping[str, Any]], None]]
+    _checked: ClassVar[Callable[[Any, Mapping[str, Any]], dict[str, Any]]]  # the registry sets it
 
     if not TYPE_CHECKING:
 
         def __new__(cls, *values: Any, **named: Any) -> TrainingConfig:
             # First, because Python would only say that the setting with a misspelt name is missing.
             more = {n: v for n, v in named.items() if n not in cls.__match_args__}
-            cls._check_learner(*values[:1] or [named.get("learner")], _plain(more))
+            cls._checked(*values[:1] or [named.get("learner")], more)
             return object.__new__(cls)
 
     def __init__(
@@ -95,8 +94,8 @@ class TrainingConfig(Settings, path="training"):
             object.__setattr__(self, setting.name, values[setting.name])
         self.check()
         pairs = {**table_of("training.hyperparameters", hyperparameters), **more}
-        TrainingConfig._check_learner(learner, plain := _plain(pairs))
-        object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
+        checked = TrainingConfig._checked(learner, pairs)
+        object.__setattr__(self, "hyperparameters", tuple(sorted(checked.items())))
 
     @classmethod
     def from_dict(cls, facts: Any) -> TrainingConfig:
@@ -153,11 +152,6 @@ class TrainingConfig(Settings, path="training"):
     def as_dict(self) -> dict[str, Any]:
         """Return the settings as names and numbers; `TrainingConfig(**facts)` reads them."""
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
-
-
-def _plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """Return numbers of NumPy as those of Python."""
-    return {n: v.item() if getattr(v, "size", 0) == 1 else v for n, v in numbers.items()}
 
 
 @dataclass(frozen=True)

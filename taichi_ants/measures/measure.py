@@ -4,8 +4,6 @@ To add one to the package, write a function in `built_in.py`, or an entry in `fi
 your own measure, call `register` in a notebook or a plugin file.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -1,15 +1,13 @@
 """The series of measures of the worlds of a colony, and the recorder that reads them."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_whole, entries_of, refuse
+from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.measures.measure import Measure, get
 from taichi_ants.records import Record
 
@@ -56,9 +54,8 @@ class SeriesRecorder:
     """
 
     def __init__(self, measures: Any = (), every: int | None = None) -> None:
-        listed = [measures] if isinstance(measures, (str, Measure)) else entries_of(measures)
-        if listed is None:
-            refuse("measures", measures, "the name of a measure, a Measure, or a list of them")
+        expect("measures", measures, str, Measure, Iterable)
+        listed = [measures] if isinstance(measures, (str, Measure)) else measures
         self.measures = list({measure.name: measure for measure in map(get, listed)}.values())
         for measure in self.measures:
             measure.check_state("measures")

@@ -1,7 +1,5 @@
 """Recording of the transitions of lone ants or of a colony as a data set."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

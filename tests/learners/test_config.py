@@ -1,7 +1,5 @@
 """The settings of a learner: their bounds, and what they are stored as."""
 
-from __future__ import annotations
-
 import json
 import pickle
 from dataclasses import asdict, replace

@@ -1,7 +1,5 @@
 """What training and evaluation refuse, each with the value named, and what they accept."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from refusals import refused
