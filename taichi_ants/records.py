@@ -71,8 +71,7 @@ class Snapshot(Record):
         counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers. Also
             `nest_deliveries`, `food_deliveries` and `caste_deliveries`, int32 (nests or kinds of
             food or castes,).
-        names: The names of the kinds of food and of the castes, at "food" and "caste"; empty if the
-            task does not name any.
+        names: The names of the fields, kinds of food and castes, at "fields", "foods", "castes".
         world: The world at the start of the episode; None if unknown.
     """
 

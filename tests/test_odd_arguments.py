@@ -1,5 +1,6 @@
 """Arguments of a wrong kind are told where they are given; no message fills a screen."""
 
+import sys
 from dataclasses import replace
 from functools import cache
 
@@ -155,6 +156,9 @@ def test_too_little_memory_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     for call, *given in calls:
         with pytest.raises(AntsError, match=r"memory for so many .*; choose smaller numbers\.$"):
             call(WORLD, *given)
+    monkeypatch.setattr(sys.modules["taichi_ants.worlds.open_world"], "scatter_rocks", fails)
+    with pytest.raises(AntsError, match="too little memory for a world of these ranges; choose"):
+        places.build("far_piles")
 
 
 def test_no_message_fills_a_screen(capsys: pytest.CaptureFixture[str]) -> None:

@@ -38,7 +38,7 @@ def _deliveries_by(snapshot: Snapshot) -> dict[str, Any]:
     parts: dict[str, Any] = {}
     for owner in ("nest", "food", "caste"):
         numbers = snapshot.counts[f"{owner}_deliveries"]
-        names = snapshot.names.get(owner) or range(len(numbers))
+        names = snapshot.names.get(f"{owner}s") or range(len(numbers))
         parts |= {f"{owner}_{n}": number for n, number in zip(names, numbers, strict=True)}
     return parts
 

@@ -330,7 +330,7 @@ class ColonyState:
             of_ants={name: shown[name] for name in OF_ANTS},
             fields=levels,
             counts=self._results().of_world(w),
-            names={"food": tuple(self.task.foods), "caste": tuple(self.task.castes)},
+            names={f.group: tuple(of) for f in FEATURES if isinstance(of := f.of(self.task), dict)},
             world=self.worlds[w],
             **further,
         )

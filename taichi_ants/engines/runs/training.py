@@ -27,7 +27,7 @@ from taichi_ants.worlds.world import World
 MAX_TABLE_ROWS = 12_800_000  # of 32 bytes each; a trace keeps the table after each training step
 
 
-@enough_memory("so many runs or episodes")
+@enough_memory("so many cells, runs or episodes")
 def train(
     world: World,
     configs: TrainingConfig | Sequence[TrainingConfig],
