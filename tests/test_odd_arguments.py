@@ -84,6 +84,7 @@ ODD = {
     "measures": lambda colony: colony.run(1, 1, measures=5),
     "a measure's snapshot": lambda colony: measures.get("deliveries")(colony),
     "who is changed": lambda _: Interventions(None),
+    "what changes": lambda colony: Interventions(colony).apply("trail"),
     "a model's data": lambda _: offline.EmpiricalModel.of(None, np.ones((1, 1))),
     "where walks start": lambda _: WORLD.walkable([10**12]),
     "no results": lambda _: plot({}),

@@ -390,6 +390,7 @@ class Interventions:
             AntsError: A world does not allow the change; nothing has changed in any world.
         """
         colony = self.colony
+        expect("the intervention", change, Intervention)
         change.check_in(colony.worlds[self.worlds[0]], colony.task, colony.learns)
         sets_start = self.lasting and isinstance(change, language.SetAnts)
         running = np.flatnonzero(colony.running).tolist() if colony.episode >= 0 else []
