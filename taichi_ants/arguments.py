@@ -1,7 +1,5 @@
 """Arguments that several functions take, checked once; kernels assume valid input."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence, Sized
 from numbers import Real
@@ -10,6 +8,7 @@ import numpy as np
 
 from taichi_ants import errors, learners
 from taichi_ants.errors import AntsError, checked_whole, count, entries_of, expect, refuse, shown
+from taichi_ants.features import FEATURES
 from taichi_ants.features.support import BASE, CASTES, COLONY, LONE, refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
@@ -94,6 +93,13 @@ def checked_capacity(
     if capacity is None:
         return min(2 * ants + 64, MAX_ANTS) if births else int(ants)
     return checked_whole("capacity", capacity, ants, MAX_ANTS, f", because {ants} ants start")
+
+
+def check_features(task: Task, worlds: Sequence[World], sharing: str) -> None:
+    """Raise AntsError if a colony with this task and sharing cannot live in the worlds."""
+    for feature in FEATURES:
+        for refusal in feature.refusals(task, worlds, sharing):
+            raise AntsError(refusal)
 
 
 def check_learner(config: TrainingConfig, task: Task, sharing: str = "independent") -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import operator
 import reprlib
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -40,6 +40,22 @@ def without_middle(message: str, most: int = 1000) -> str:
 def refuse(name: str, value: object, allowed: str) -> NoReturn:
     """Raise the AntsError for a value that is not allowed."""
     raise AntsError(f"{name} is {shown(value)}; it must be {allowed}.")
+
+
+def words_of(error: Exception, what: str = "this") -> str:
+    """Return the sentence about an error, also about `what` there is too little memory for."""
+    if isinstance(error, MemoryError):
+        return f"there is too little memory for {what}; choose smaller numbers."
+    return str(error)
+
+
+@contextmanager
+def enough_memory(what: str) -> Iterator[None]:
+    """Return a decorator, or context, that raises AntsError if there is too little memory."""
+    try:
+        yield
+    except MemoryError as error:
+        raise AntsError(words_of(error, what)) from error
 
 
 def unusable(registered: Any, fault: object) -> AntsError:
@@ -190,6 +206,6 @@ def expect(name: str, value: object, *kinds: type) -> None:
 
 
 _PLAIN = {"str": "text", "NoneType": "None", "ndarray": "an array", "PathLike": "a path"}
-_PLAIN |= {"Mapping": "a mapping of names to values"}
+_PLAIN |= {"Mapping": "a mapping of names to values", "Iterable": "a list"}
 _PLAIN |= {"World": "a World, such as worlds.paper()"}
 _PLAIN |= {"Tidy": "a result of Colony.run, train or evaluate"}

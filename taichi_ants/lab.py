@@ -4,8 +4,6 @@ A link is `CODE;TICK;HASH`: a code, the tick at which it was copied, and a hash 
 For the code, see `lab/page/link.js`, which writes it.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterator
 from typing import Any, NamedTuple

@@ -7,8 +7,6 @@ applied in the order of the fields of `ProtocolEvent`. Events of the same tick a
 order of the protocol.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Annotated, Any

@@ -71,6 +71,7 @@ class Snapshot(Record):
         counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers. Also
             `nest_deliveries`, `food_deliveries` and `caste_deliveries`, int32 (nests or kinds of
             food or castes,).
+        names: The names of the fields, kinds of food and castes, at "fields", "foods", "castes".
         world: The world at the start of the episode; None if unknown.
     """
 
@@ -91,6 +92,7 @@ class Snapshot(Record):
     of_ants: Mapping[str, np.ndarray] = field(default_factory=dict)
     fields: Mapping[str, np.ndarray] = field(default_factory=dict)
     counts: Mapping[str, Any] = field(default_factory=dict)
+    names: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     world: World | None = None
 
     def __getattr__(self, name: str) -> np.ndarray:

@@ -1,7 +1,5 @@
 """The registry of learners, observations, worlds, measures and rules: names and what they name."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, Generic, TypeVar

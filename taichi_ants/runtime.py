@@ -3,8 +3,6 @@
 Importing the package does not start Taichi; the first call that needs a kernel starts it.
 """
 
-from __future__ import annotations
-
 import ast
 import contextlib
 import ctypes

@@ -420,6 +420,7 @@ class Settings:
         required = [setting for setting in declared(cls) if setting.default is MISSING]
         for setting in required:
             if setting.name not in facts:
+                cls.__new__(cls, **facts)  # raises an error if the name is misspelt
                 raise AntsError(f"`{setting.path}` is missing; add it.")
         return {setting.name: facts[setting.name] for setting in required}
 

@@ -1,7 +1,5 @@
 """Checks of rules and observations that you wrote; `taichi-ants check` checks learners, too."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 

@@ -1,5 +1,6 @@
 """Arguments of a wrong kind are told where they are given; no message fills a screen."""
 
+import sys
 from dataclasses import replace
 from functools import cache
 
@@ -11,9 +12,12 @@ from taichi_ants import (
     Rewards,
     Task,
     TrainingConfig,
+    arguments,
     evaluate,
     learners,
+    measures,
     offline,
+    plot,
     record,
     rendering,
     rollout,
@@ -77,6 +81,13 @@ ODD = {
         Colony(WORLD, None, None, range(3), 2, sharing="frozen"), RAGGED
     ),
     "two runs": lambda _: rollout(WORLD, train(WORLD, CONFIG, range(2), 1)),
+    "measures": lambda colony: colony.run(1, 1, measures=5),
+    "a measure's snapshot": lambda colony: measures.get("deliveries")(colony),
+    "who is changed": lambda _: Interventions(None),
+    "what changes": lambda colony: Interventions(colony).apply("trail"),
+    "a model's data": lambda _: offline.EmpiricalModel.of(None, np.ones((1, 1))),
+    "where walks start": lambda _: WORLD.walkable([10**12]),
+    "no results": lambda _: plot({}),
     "two policies": lambda _: rollout(WORLD, np.zeros((2, 128, 5))),
     "a world's name": lambda _: places.registry.check_seed_counts(LONG),
 }
@@ -135,6 +146,20 @@ def test_several_tables_are_counted_where_one_is_wanted() -> None:
 
 def test_whole_numbers_of_numpy_are_whole_numbers() -> None:
     assert len(rollout(WORLD, TABLE, max_steps=SCALAR)) == 5
+
+
+def test_too_little_memory_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*given: object) -> None:
+        raise MemoryError("Unable to allocate 64.0 GiB for an array")
+
+    monkeypatch.setattr(arguments, "checked_seeds", fails)
+    calls = (train, CONFIG, 0), (evaluate, TABLE), (record,), (Colony, None, CONFIG)
+    for call, *given in calls:
+        with pytest.raises(AntsError, match=r"memory for so many .*; choose smaller numbers\.$"):
+            call(WORLD, *given)
+    monkeypatch.setattr(sys.modules["taichi_ants.worlds.open_world"], "scatter_rocks", fails)
+    with pytest.raises(AntsError, match="too little memory for a world of these ranges; choose"):
+        places.build("far_piles")
 
 
 def test_no_message_fills_a_screen(capsys: pytest.CaptureFixture[str]) -> None:

@@ -366,7 +366,7 @@ EXPORT void read_mind(int i)
 static uint64_t hash;
 static void stir(uint64_t word) { hash = bits_of(advance(hash ^ word)); }
 
-/* The hash of the state; see `state_hash` in taichi_ants/replay.py. The page reads it in halves. */
+/* The hash of the state; see `state_hash` in taichi_ants/lab.py. The page reads it in halves. */
 EXPORT uint32_t hash_state(int half)
 {
     if (half)

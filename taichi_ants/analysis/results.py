@@ -202,6 +202,8 @@ def _tables_of(results: Mapping[str, Tidy]) -> dict[str, Measured]:
     """Return the tables of results by name; AntsError unless all have the same seeds."""
     for name, result in results.items():
         expect(name or "result", result, Tidy)
+    if not results:
+        raise AntsError("there are no results; give at least one.")
     tables = {name: result.measured() for name, result in results.items()}
     first, *others = tables
     for name in others:

@@ -13,8 +13,6 @@ because each can be too short. A bootstrap of few seeds never exceeds its most e
 the t interval is a point if the middle half consists of ties.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import NamedTuple
@@ -64,7 +62,7 @@ def interquartile_mean(values: np.ndarray) -> np.ndarray:
     >>> interquartile_mean(np.array([[0, 1, 2, 9]]))
     array([1.5])
     """
-    ordered = np.sort(np.asarray(values, float), axis=1)
+    ordered = np.sort(np.atleast_2d(np.asarray(values, float)), axis=1)
     cut = ordered.shape[1] // 4
     middle = ordered[:, cut : ordered.shape[1] - cut].mean(axis=1)
     return np.where(np.isnan(ordered[:, -1]), np.nan, middle)  # nan is sorted to the end
@@ -171,15 +169,15 @@ def student_interval(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return Student's t interval of the mean over seeds; with `iqm`, Tukey and McLaughlin's.
 
-    Arguments and results are those of `bootstrap_interval`, but values have two dimensions.
+    Arguments and results are those of `bootstrap_interval`.
 
-    >>> low, high = student_interval(np.arange(10)[None])
+    >>> low, high = student_interval(np.arange(10))
     >>> low.round(1), high.round(1)
     (array([2.3]), array([6.7]))
     """
     from scipy.special import stdtrit
 
-    values = np.asarray(values, float)
+    values = np.atleast_2d(np.asarray(values, float))
     rows, n = values.shape
     if n < 2:
         return np.full(rows, np.nan), np.full(rows, np.nan)

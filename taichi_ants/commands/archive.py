@@ -4,8 +4,6 @@ The archive has the folder, with the runs and all files that the study has read,
 packages, and a description of the model. See docs/how-to/clusters.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import io
 import zipfile

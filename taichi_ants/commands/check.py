@@ -6,8 +6,6 @@ learns for 2000 steps while Taichi checks indices. The command prints a line for
 with status 1 if one has a fault. See docs/how-to/models.md.
 """
 
-from __future__ import annotations
-
 import argparse
 from itertools import chain
 

@@ -4,8 +4,6 @@ The command computes the study in a new folder, prints a line for each file, and
 if one differs. See docs/how-to/clusters.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import filecmp
 import platform

@@ -4,8 +4,6 @@ The command reads only files, so it also works while another process, or another
 same disk, computes. See docs/how-to/clusters.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import time

@@ -4,8 +4,6 @@ While a study runs, some runs are missing. Their rows are left out, and figures 
 for the last run. The command reads only the folder, and can run at any time.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

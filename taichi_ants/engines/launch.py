@@ -1,7 +1,5 @@
 """Kernel launches with argument packs: arrays and numbers as one argument."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import nullcontext

@@ -232,14 +232,14 @@ def update_weights_of(state: State, castes: np.ndarray, ants: np.ndarray) -> np.
     return np.where(numbers["learns"] == 1, weights, 0.0)
 
 
-def _refusals(state: State) -> Iterator[str]:
-    for name, caste in state.task.castes.items():
-        if caste.nest is not None and caste.nest >= state.n_nests:
+def _refusals(task: Task, worlds: Any, sharing: str) -> Iterator[str]:
+    for name, caste in task.castes.items():
+        if caste.nest is not None and caste.nest >= (n := worlds[0].n_nests):
             yield (
                 f"`task.castes.{name}.nest` is {caste.nest}, but the world has "
-                f"{count(state.n_nests, 'nest')}, numbered from 0; choose one of them."
+                f"{count(n, 'nest')}, numbered from 0; choose one of them."
             )
-        if caste.policy is not None and state.sharing == "independent":
+        if caste.policy is not None and sharing == "independent":
             yield (
                 f"`task.castes.{name}.policy` is {caste.policy!r}, but sharing is "
                 '"independent", so each ant learns into its own table; set sharing to "shared" or '

@@ -122,7 +122,7 @@ class Feature:
             `tables_by` follow, by this number, and their names in messages.
         without_files: A function of a task that returns one without files as policies.
         constants: A function of a colony that returns further arrays of its kernels.
-        refusals: A function of a colony that yields why it cannot be, as sentences.
+        refusals: A function of a colony's task, worlds and sharing that yields why it cannot be.
         counts: A function of a colony that returns further results of the episode so far (W, ...),
             by their names in `ColonyEpisodes`; also if no task uses the feature.
         paid: A function of a colony and of rewards by event (W, capacity), which returns rewards.
@@ -154,7 +154,7 @@ class Feature:
     policies: Callable[[Task], Mapping[int, tuple[str, str]]] = lambda task: {}
     without_files: Callable[[Task], Task] = lambda task: task
     constants: Callable[[State], Mapping[str, Any]] = lambda state: {}
-    refusals: Callable[[State], Iterator[str]] = lambda state: iter(())
+    refusals: Callable[[Task, Any, str], Iterator[str]] = lambda task, worlds, sharing: iter(())
     counts: Callable[[State], Mapping[str, Any]] = lambda state: {}
     paid: Callable[[State, np.ndarray], np.ndarray] = lambda state, rewards: rewards
     shown: Callable[..., Mapping[str, Any]] = lambda state, w, slots, is_food: {}

@@ -66,12 +66,12 @@ def _faults(task: Task) -> Iterator[str]:
         )
 
 
-def _refusals(state: State) -> Iterator[str]:
-    for world in state.worlds:
-        if world.n_food_kinds > state._model.n_kinds:
+def _refusals(task: Task, worlds: Any, sharing: str) -> Iterator[str]:
+    for world in worlds:
+        if world.n_food_kinds > (n := max(1, len(task.foods))):
             yield (
-                f"the world has {count(world.n_food_kinds, 'kind')} of food, but the task "
-                f"{state._model.n_kinds}; add the others to `task.foods`."
+                f"the world has {count(world.n_food_kinds, 'kind')} of food, but the task {n}; "
+                "add the others to `task.foods`."
             )
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from taichi_ants.errors import AntsError
@@ -25,8 +25,8 @@ class TrainingConfig(Settings, path="training"):
     does not change. If `initial_q` is larger than all possible returns ("optimistic"), ants try all
     actions. `hyperparameters` are those of the learner, sorted (name, number) pairs. Give them as a
     mapping or as keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. All others have the
-    defaults of `taichi_ants.learners.get(name).hyperparameters()`. Training, not this class, checks
-    that the learner exists and has these hyperparameters.
+    defaults of `taichi_ants.learners.get(name).hyperparameters()`. Training checks that the learner
+    exists, and its hyperparameters if you register it after this call.
 
     >>> TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=3).planning_steps
     3
@@ -64,11 +64,15 @@ class TrainingConfig(Settings, path="training"):
         Setting("action values before learning; high values make ants try every action"),
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
+    _checked: ClassVar[Callable[[Any, Mapping[str, Any]], dict[str, Any]]]  # the registry sets it
 
     if not TYPE_CHECKING:
 
         def __new__(cls, *values: Any, **named: Any) -> TrainingConfig:
-            return object.__new__(cls)  # further names are hyperparameters
+            # First, because Python would only say that the setting with a misspelt name is missing.
+            more = {n: v for n, v in named.items() if n not in cls.__match_args__}
+            cls._checked(*values[:1] or [named.get("learner")], more)
+            return object.__new__(cls)
 
     def __init__(
         self,
@@ -90,8 +94,8 @@ class TrainingConfig(Settings, path="training"):
             object.__setattr__(self, setting.name, values[setting.name])
         self.check()
         pairs = {**table_of("training.hyperparameters", hyperparameters), **more}
-        plain = {n: v.item() if getattr(v, "size", 0) == 1 else v for n, v in pairs.items()}
-        object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
+        checked = TrainingConfig._checked(learner, pairs)
+        object.__setattr__(self, "hyperparameters", tuple(sorted(checked.items())))
 
     @classmethod
     def from_dict(cls, facts: Any) -> TrainingConfig:
@@ -127,12 +131,10 @@ class TrainingConfig(Settings, path="training"):
         >>> config.replace(learner="q_learning").learner
         'q_learning'
         """
-        common = [setting.name for setting in declared(TrainingConfig)]
-        more = {name: value for name, value in changes.items() if name not in common}
-        same = changes.get("learner", self.learner) == self.learner
+        common = {s.name: changes.pop(s.name) for s in declared(type(self)) if s.name in changes}
+        same = common.get("learner", self.learner) == self.learner
         kept = dict(self.hyperparameters) if same else {}
-        changed = super().replace(**{n: value for n, value in changes.items() if n in common})
-        return replace(changed, hyperparameters=tuple({**kept, **more}.items()))
+        return super().replace(**common, hyperparameters={**kept, **changes})
 
     def next_learning_rate(self, rate: float) -> float:
         """Return the learning rate of the episode after one with learning rate `rate`."""

@@ -1,12 +1,10 @@
 """The class of learners: functions that update a table of action values, and their memory."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import refuse, shown
 from taichi_ants.kernel_functions import kernel_function
 from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 
@@ -74,12 +72,9 @@ class Learner:
 
     def __post_init__(self) -> None:
         for part in ("learn", "begin", "td_error"):
-            function = getattr(self, part)
-            if function is not None:
+            if (function := getattr(self, part)) is not None:
                 if not callable(function):
-                    raise AntsError(
-                        f"{part} of {shown(self.name)} is {shown(function)}; it must be a function."
-                    )
+                    refuse(f"{part} of {shown(self.name)}", function, "a function")
                 object.__setattr__(self, part, kernel_function(function))
 
     def settings(self, config: TrainingConfig) -> Hyperparameters:

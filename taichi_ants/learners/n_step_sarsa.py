@@ -64,9 +64,7 @@ N_STEP_SARSA = Learner(
     begin,
     draws_next_action=True,
     hyperparameters=Steps,
-    memory=lambda settings, n_states: Memory(
-        floats=settings.n_steps, integers=2 + settings.n_steps
-    ),
+    memory=lambda settings, _: Memory(floats=settings.n_steps, integers=2 + settings.n_steps),
     cost=lambda settings: 1 + 0.25 * settings.n_steps,
     summary="SARSA with targets of several rewards and the value after them",
 )

@@ -4,8 +4,6 @@ A policy is a float32 array (n_states, 5), the value of each action in each stat
 An ant takes an action with the largest value; ties are broken at random with equal probability.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -15,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError, as_array, check_one_of, expect, shown
+from taichi_ants.errors import AntsError, as_array, check_one_of, expect, refuse, shown
 from taichi_ants.files import PathLike
 from taichi_ants.files.archives import Kind
 from taichi_ants.learners.config import TrainingConfig
@@ -174,10 +172,8 @@ def frozen_policy(
     if name_or_path in NAMED:
         return NAMED[name_or_path](observation)
     if not name_or_path.endswith(".npz"):
-        raise AntsError(
-            f"{name} is {shown(name_or_path)}; it must be one of {', '.join(NAMED)}, or "
-            "the path of a policy file (.npz)."
-        )
+        allowed = f"one of {', '.join(NAMED)}, or the path of a policy file (.npz)"
+        refuse(name, name_or_path, allowed)
     policy = load_policy(name_or_path)
     if policy.observation != observation:
         raise AntsError(

@@ -4,10 +4,10 @@ To add one to the package, write a file in this folder and add its name to `BUIL
 own learner, call `register` from a plugin file.
 """
 
-from __future__ import annotations
-
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from importlib import import_module
+from typing import Any
 
 from taichi_ants.errors import AntsError, expect, unusable
 from taichi_ants.learners.config import TrainingConfig
@@ -76,10 +76,22 @@ def with_hyperparameters(config: TrainingConfig) -> TrainingConfig:
     Raises AntsError if the learner or a hyperparameter does not exist, or a value is not allowed.
     """
     expect("the configuration", config, TrainingConfig)
-    kind = get(config.learner).hyperparameters
-    known = [setting.name for setting in (*declared(kind), *declared(TrainingConfig))]
-    for name, _ in config.hyperparameters:
-        if name not in known[: len(declared(kind))]:
-            raise AntsError(f"`training.{name}` {not_a_setting(name, known, config.learner)}")
-    hyperparameters = kind(**dict(config.hyperparameters))
-    return replace(config, hyperparameters=tuple(asdict(hyperparameters).items()))
+    learner = get(config.learner)
+    config = replace(config)  # checks hyperparameters of a learner that was registered later
+    return replace(config, hyperparameters=tuple(asdict(learner.settings(config)).items()))
+
+
+def _checked(learner: Any, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return hyperparameters as numbers of Python, checked if the learner is registered."""
+    plain = {n: v.item() if getattr(v, "size", 0) == 1 else v for n, v in given.items()}
+    if plain and isinstance(learner, str) and learner in names():
+        kind = get(learner).hyperparameters
+        known = [setting.name for setting in (*declared(kind), *declared(TrainingConfig))]
+        for name in plain:
+            if name not in known[: len(declared(kind))]:
+                raise AntsError(f"`training.{name}` {not_a_setting(name, known, learner)}")
+        kind(**plain)
+    return plain
+
+
+TrainingConfig._checked = staticmethod(_checked)

@@ -11,7 +11,7 @@ from taichi_ants.kernel_functions import ti
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.memory import discount_of
-from taichi_ants.settings import Setting
+from taichi_ants.settings import Setting, Share
 from taichi_ants.task.constants import ROW
 
 
@@ -20,8 +20,7 @@ class Traces(Hyperparameters):
     """The hyperparameters of SARSA(lambda); a new trace replaces the oldest if there is no room."""
 
     trace_decay: Annotated[
-        float,
-        Setting("lambda: factor on traces per step, in addition to the discount", least=0, most=1),
+        Share, Setting("lambda: factor on traces per step, in addition to the discount")
     ] = 0.9
     trace_length: Annotated[
         int, Setting("largest number of eligibility traces", least=1, most=256)
@@ -74,9 +73,7 @@ SARSA_LAMBDA = Learner(
     begin,
     draws_next_action=True,
     hyperparameters=Traces,
-    memory=lambda settings, n_states: Memory(
-        floats=settings.trace_length, integers=1 + settings.trace_length
-    ),
+    memory=lambda settings, _: Memory(0, settings.trace_length, 1 + settings.trace_length),
     cost=lambda settings: 1 + 0.05 * settings.trace_length,
     summary="SARSA that also updates earlier pairs, in proportion to their traces",
 )

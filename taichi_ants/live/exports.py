@@ -15,7 +15,7 @@ from itertools import chain
 from multiprocessing.connection import Connection
 from typing import Any
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, words_of
 from taichi_ants.live.session import Log, Session, bytes_of
 from taichi_ants.viewer import Recording, page
 
@@ -75,10 +75,8 @@ class Replay:
                 if time.monotonic() > until:
                     return
             self.result = self._last
-        except AntsError as error:
-            self.result = str(error)
-        except MemoryError:
-            self.result = "a replay needs more memory than is available."
+        except (AntsError, MemoryError) as error:
+            self.result = words_of(error, "the replay")
 
     def cancel(self) -> None:
         """Do nothing, because the session of the server has not changed."""

@@ -27,7 +27,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from taichi_ants.errors import AntsError, imported
+from taichi_ants.errors import AntsError, imported, words_of
 from taichi_ants.live.choices import Choices, sliders
 from taichi_ants.live.exports import LOAD, QUICK, SLOW, Export, Replay
 from taichi_ants.live.session import Log, Session
@@ -279,9 +279,7 @@ class SessionServer:
             try:
                 await self._do(page, request)
             except (AntsError, MemoryError) as error:
-                no_memory = isinstance(error, MemoryError)
-                words = "this needs more memory than is available." if no_memory else str(error)
-                self._send(_message("error", words=words), to=page)
+                self._send(_message("error", words=words_of(error)), to=page)
             self._send_state_soon()
 
     def _send_state_soon(self) -> None:

@@ -34,12 +34,13 @@ def share_of(which: np.ndarray) -> float:
     return int(np.count_nonzero(which)) / len(which) if len(which) else math.nan
 
 
-def _deliveries_by(counts: Counts) -> dict[str, Any]:
-    return {
-        f"{owner}_{i}": number
-        for owner in ("nest", "food", "caste")
-        for i, number in enumerate(counts[f"{owner}_deliveries"])
-    }
+def _deliveries_by(snapshot: Snapshot) -> dict[str, Any]:
+    parts: dict[str, Any] = {}
+    for owner in ("nest", "food", "caste"):
+        numbers = snapshot.counts[f"{owner}_deliveries"]
+        names = snapshot.names.get(f"{owner}s") or range(len(numbers))
+        parts |= {f"{owner}_{n}": number for n, number in zip(names, numbers, strict=True)}
+    return parts
 
 
 def first_delivery(counts: Counts) -> Any:
@@ -147,7 +148,7 @@ _LISTED = (
     Measure("deliveries", lambda c: c["deliveries"], "food items",
             "deliveries since the start of the episode", COUNTS),
     Measure("deliveries_by", _deliveries_by, "food items",
-            "deliveries by nest, kind of food and caste", COUNTS),
+            "deliveries by nest, kind of food and caste"),
     Measure("first_delivery", first_delivery, "ticks",
             "first passage time; if there is none, ticks so far", COUNTS),
     Measure("efficiency", lambda c: ratio(c["deliveries"], c["ticks"] * c["living"]),

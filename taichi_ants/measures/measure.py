@@ -4,8 +4,6 @@ To add one to the package, write a function in `built_in.py`, or an entry in `fi
 your own measure, call `register` in a notebook or a plugin file.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -14,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, check_one_of, shown
+from taichi_ants.errors import AntsError, check_one_of, expect, shown
+from taichi_ants.records import Snapshot
 from taichi_ants.registry import Registry
 
 COUNTS, RUN = "counts", "run"  # values of `Measure.of`
@@ -85,6 +84,7 @@ class Measure:
         Raises:
             AntsError: The function fails or returns something else, or the part does not exist.
         """
+        expect("the argument of a measure", snapshot, Snapshot)
         value = self.computed(snapshot.counts if self.of == COUNTS else snapshot)
         _, _, part = self.name.partition(".")
         if part:

@@ -1,15 +1,13 @@
 """The series of measures of the worlds of a colony, and the recorder that reads them."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_whole
+from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.measures.measure import Measure, get
 from taichi_ants.records import Record
 
@@ -56,6 +54,7 @@ class SeriesRecorder:
     """
 
     def __init__(self, measures: Any = (), every: int | None = None) -> None:
+        expect("measures", measures, str, Measure, Iterable)
         listed = [measures] if isinstance(measures, (str, Measure)) else measures
         self.measures = list({measure.name: measure for measure in map(get, listed)}.values())
         for measure in self.measures:

@@ -4,8 +4,6 @@ The *target policy* is the evaluated policy, and the *behaviour policy* generate
 value of a policy is its expected discounted return from the first states of the data's episodes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Annotated, NamedTuple
 

@@ -151,6 +151,7 @@ class EmpiricalModel:
 
         `times`, integers (groups, episodes), says how often a group has an episode.
         """
+        expect("data", data, Dataset)
         n_states, size = data.task.n_states, data.task.n_states * N_ACTIONS
         pair = data.state.astype(np.int64) * N_ACTIONS + data.action
         # A pair of state and action, and its next state; n_states means that the step terminated.

@@ -1,7 +1,5 @@
 """Recording of the transitions of lone ants or of a colony as a data set."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +8,7 @@ import numpy as np
 from taichi_ants import arguments
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.engine import Runs
-from taichi_ants.errors import AntsError, checked_whole, expect
+from taichi_ants.errors import AntsError, checked_whole, enough_memory, expect
 from taichi_ants.features.support import BASE, CASTES, CHOICE, FOODS, refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import action_probabilities, checked_values, random_policy
@@ -27,6 +25,7 @@ _FROM_TRACE |= {"next_state": "next_states", "terminated": "terminated", "episod
 _FROM_TRACE |= {"run": "runs", "behaviour_probability": "chances"}
 
 
+@enough_memory("so many seeds or episodes")
 def record(
     world: World,
     behaviour: TrainingConfig | np.ndarray | None = None,
@@ -88,6 +87,7 @@ def record(
     return _dataset(pieces, world=world, task=task, seeds=numbers, behaviour=facts)
 
 
+@enough_memory("so many episodes")
 def record_colony(colony: Colony, episodes: int = 1, ticks: int = 1000) -> Dataset:
     """Return the transitions of a colony's ants while it runs more episodes of `ticks` each.
 

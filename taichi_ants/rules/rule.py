@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import field, make_dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
-from taichi_ants.errors import AntsError, check_one_of, shown, unusable
+from taichi_ants.errors import AntsError, check_one_of, refuse, shown, unusable
 from taichi_ants.features.feature import Input
 from taichi_ants.features.rule import RULES, Parameters, Rule
 from taichi_ants.rules.inputs import KINDS, drawn, field_of, input_of, values_shown
@@ -48,9 +48,7 @@ def register(
 
     def add(function: Callable[..., Any]) -> Callable[..., Any]:
         if not inspect.isfunction(function) or function.__name__ == "<lambda>":
-            raise AntsError(
-                f"the rule is {shown(function)}; it must be a function defined with def."
-            )
+            refuse("the rule", function, "a function defined with def")
         called = function.__name__ if name is None else name
         RULES.check_new(called)
         if called in RULES.yours and RULES.yours[called].kind != kind:

@@ -10,8 +10,6 @@ result adds to the settings in study.json. A file that does not change the meani
 without raising its `VERSION` has that number; otherwise its text is a part of the keys of its runs.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from taichi_ants.errors import AntsError, without_middle
+from taichi_ants.errors import AntsError, without_middle, words_of
 from taichi_ants.settings import Named, Settings, declared, nested
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
@@ -228,8 +228,7 @@ def reporting(interrupted: str = "Stopped.") -> Iterator[None]:
         _discard_output()
     except (AntsError, OSError, MemoryError) as error:
         _discard_output()
-        text = str(error) or "the command needs more memory than is available"
-        notice(f"error: {text.rstrip('.')}.")
+        notice(f"error: {words_of(error).rstrip('.')}.")
         status = getattr(error, "exit_status", EXIT_BAD_INPUT)
     sys.exit(status)
 

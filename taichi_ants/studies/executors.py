@@ -6,8 +6,6 @@ raises an error if they are lost. `Workers` are processes on this machine, `stud
 of a cluster, and the executors of Dask and mpi4py work as they are.
 """
 
-from __future__ import annotations
-
 import concurrent.futures
 import multiprocessing
 import os

@@ -233,6 +233,8 @@ class ColonyPoint:
         _check(self, bool(can_skip_training), "a colony", COLONY)
         arguments.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
         check_one_of("sharing", self.sharing, ("shared", "independent"))
+        worlds = self.first_world, *(self.pool or ())
+        arguments.check_features(self.task, worlds, self.sharing)
         arguments.check_learner(self.training, self.task, self.sharing)
         for name in ("episodes", "policy", "after", "evaluation_epsilon"):
             if not rule.needs_table and getattr(self, name) not in (None, 0):

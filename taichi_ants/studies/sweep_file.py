@@ -58,6 +58,8 @@ class Base(NamedTuple):
     def of(cls, file: Settings) -> Base:
         """Return the part of a file; AntsError if a key or value is not allowed."""
         kind: Any = file.get("kind")
+        if kind is None:
+            raise AntsError(f"kind is missing; set it to one of {', '.join(KINDS)}.")
         check_one_of("kind", kind, tuple(KINDS))
         wanted = as_list(file.get("measures", []))
         if not wanted:

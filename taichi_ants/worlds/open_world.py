@@ -1,13 +1,11 @@
 """Random worlds with rocks, scattered food items and piles of food."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, whole
+from taichi_ants.errors import AntsError, enough_memory, whole
 from taichi_ants.grid.hexgrid import AxialGrid, axial, cube
 from taichi_ants.grid.randomness import Stream, choose
 from taichi_ants.settings import Setting, checked
@@ -32,6 +30,7 @@ Piles = Annotated[int, Setting("number of piles of food", most=3)]
 
 
 @checked
+@enough_memory("a world of these ranges")
 def open_world(
     seed: int = 0,
     ranges: Ranges = None,

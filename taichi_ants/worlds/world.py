@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown, whole
+from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole, shown, whole
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.grid.randomness import choose, stream_state
@@ -207,7 +207,7 @@ class World:
         269
         """
         free, reached = self.ground() == EMPTY, np.zeros(self.grid.size, bool)
-        new = np.asarray(starts)
+        new = as_array("starts", starts, "iu", (None,), 0, self.grid.size - 1)
         while len(new := np.unique(new[free[new] & ~reached[new]])):
             reached[new] = True
             new = (new[:, None] + self.grid.offsets).ravel()

@@ -95,12 +95,13 @@ def test_figures_are_added_to_finished_results_without_new_runs(sweep, monkeypat
 
 
 WRONG = [
-    ('kind = "runs"', "", ["kind is None", "runs, colony"]),
+    ('kind = "runs"', "", ["kind is missing", "runs, colony"]),
     (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
     ("shaping =", "shapings =", ["rewards.shapings` is not a setting; choose shaping"]),
     ("seeds =", "seds =", ["'seds' is not a setting", "choose seeds"]),
     ("rollouts", "ants", ["'ants' is not a setting of a sweep of kind 'runs'"]),
     ("discount = 0.9", "", ["training.discount` is missing"]),
+    ("discount =", "discont =", ["`training.discont` is not a setting of", "choose discount"]),
     ("discount = 0.9", "discount = 1.9", ["discount` is 1.9"]),
     ("discount", "epsilon = 0.1\ndiscount", ["training.epsilon is in [vary]"]),
     ("[1, 0]", "[]", ["task.rewards.shaping cannot vary, or has no values"]),
@@ -242,6 +243,7 @@ WRONG_EVENTS = [
         "learning_rate",
         ["in [[at]] number 1, in the evaluation, the ants"],
     ),
+    ("[task]", "[task]\ncastes.a.nest = 3", ["`task.castes.a.nest` is 3", "has 1 nest"]),
     ("[[every]]", "[every]", ["[every] must be [[every]]"]),
     ("at.1.remove", "at.2.remove", ["the file has no at.2; add it"]),
     (

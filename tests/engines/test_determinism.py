@@ -1,7 +1,5 @@
 """A run depends on its world, configuration and seed alone: to the bit, on every repeat."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 

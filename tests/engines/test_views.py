@@ -1,7 +1,5 @@
 """Observations of a user's own: compiled for the kernels after a check, or refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from refusals import refused

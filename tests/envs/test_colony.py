@@ -1,7 +1,5 @@
 """Ants that are given their actions do what those of the plain reference do, event by event."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from colonies import act, training

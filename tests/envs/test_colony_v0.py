@@ -1,7 +1,5 @@
 """The colony of PettingZoo: its own conformance tests, agents that appear and die, copies."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The vector environment of ants: as single worlds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

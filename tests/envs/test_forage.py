@@ -1,7 +1,5 @@
 """One ant as a Gymnasium environment, and many of them in one vector environment."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import warnings

@@ -1,7 +1,5 @@
 """Ctrl-C in environments: whether an episode has ended is what the kernel did."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rollouts, compared with calls of `step`: in all modes, tasks and formats, from any state."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

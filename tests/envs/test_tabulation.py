@@ -1,7 +1,5 @@
 """Policies that are functions, as tables."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

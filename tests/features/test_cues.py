@@ -1,7 +1,5 @@
 """Cues declared as the compass is: kernels equal their twins, and pages have their words."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

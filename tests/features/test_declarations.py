@@ -1,7 +1,5 @@
 """Features are declared once: unique names, twins with the same points, no names elsewhere."""
 
-from __future__ import annotations
-
 import ast
 from collections import Counter
 from functools import cache

@@ -1,7 +1,5 @@
 """Ants can rest with food, and after drawing their next action; no built-in feature does so."""
 
-from __future__ import annotations
-
 from same_colonies import every_tick
 
 from taichi_ants import Colony, TrainingConfig, worlds

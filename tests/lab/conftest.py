@@ -1,7 +1,5 @@
 """The lab's modules in Node."""
 
-from __future__ import annotations
-
 import shutil
 
 import pytest

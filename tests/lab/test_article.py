@@ -1,7 +1,5 @@
 """The article in a real browser: ten worlds that run in view, and what their controls change."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Kernels and WebAssembly have the same colonies, and the page sees them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The lessons as a page, in a real browser without a network: a student's way through them."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Links, worlds and settings are the same in JavaScript and Python."""
 
-from __future__ import annotations
-
 import base64
 import json
 import runpy

@@ -1,7 +1,5 @@
 """The live page without a server, in a real browser: a visit to the lab, to look back at."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Lone ants of the page train as `train` does; a compiler builds the same programs again."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import runpy

@@ -1,7 +1,5 @@
 """The lab in a real browser: its story, brushes and controls, and links that Python replays."""
 
-from __future__ import annotations
-
 import importlib.util
 import itertools
 import re

@@ -1,7 +1,5 @@
 """The protocol of the live page: the server in Python and the lab's worker answer alike."""
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil

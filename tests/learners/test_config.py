@@ -1,10 +1,8 @@
 """The settings of a learner: their bounds, and what they are stored as."""
 
-from __future__ import annotations
-
 import json
 import pickle
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from fractions import Fraction
 
 import numpy as np
@@ -39,12 +37,21 @@ def test_rates_fall_by_their_factors_down_to_their_least():
         ("dyna_q", "planning_steps", "3", "`training.planning_steps` is '3'; it must be a whole"),
         ("dyna_q", "planning_steps", True, "`training.planning_steps` is True; it must be a whole"),
         ("dyna_q", "trace_decay", 0.5, "is not a setting of dyna_q; choose one of"),
-        ("td_zero", "n_steps", 3, "there is no learner 'td_zero'; choose one of q_learning, "),
+        ("q_learning", "learning_rat", 0.5, "choose one of learning_rate, "),
     ],
 )
 def test_hyperparameters_are_those_of_the_learner(learner, name, value, says):
-    config = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99, hyperparameters={name: value})
-    refused(says, learners.registry.with_hyperparameters, config)
+    refused(says, TrainingConfig, learner, 0.1, 0.9, 0.3, 0.99, hyperparameters={name: value})
+    refused(says, TrainingConfig, learner, **{name: value})  # not what else is missing
+
+
+def test_hyperparameters_of_a_learner_that_is_registered_later_are_checked_in_use(monkeypatch):
+    monkeypatch.setattr(learners.registry.LEARNERS, "yours", {})
+    config = TrainingConfig("later", 0.1, 0.9, 0.3, 0.99, n_steps=3)
+    complete = learners.registry.with_hyperparameters
+    refused("there is no learner 'later'; choose one of q_learning, ", complete, config)
+    learners.register(replace(learners.get("sarsa"), name="later"))
+    refused("`training.n_steps` is not a setting of later", complete, config)
 
 
 def test_numbers_of_any_kind_are_stored_as_plain_ones():

@@ -1,7 +1,5 @@
 """What every registered learner must be, in whatever file it stands."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The hand-written policies, and policy files."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The live page in a real browser: each control, and worlds that equal the engine's."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The form of a new session has every setting, and makes the tasks that have names."""
 
-from __future__ import annotations
-
 import pytest
 
 from taichi_ants import TrainingConfig

@@ -1,7 +1,5 @@
 """The server: who gets in, what pages receive, and that no page can do harm."""
 
-from __future__ import annotations
-
 import http.client
 import time
 from contextlib import closing

@@ -1,7 +1,5 @@
 """Sessions: replayed to the bit, seen alike by all who look on, and nothing wrong changes them."""
 
-from __future__ import annotations
-
 import functools
 import json
 from dataclasses import replace

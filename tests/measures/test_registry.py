@@ -9,6 +9,7 @@ from taichi_ants import AntsError, Colony, TrainingConfig, When, measures, summa
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.measures.measure import MEASURES
 from taichi_ants.measures.series import SeriesRecorder
+from taichi_ants.task import Task
 
 FROZEN = {"sharing": "frozen", "q_values": trail_follower()}
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
@@ -38,6 +39,13 @@ def test_a_measure_of_a_snapshot_is_one_number():
     }.items():
         with pytest.raises(AntsError, match=message):
             measures.get(name)(snapshot)
+
+
+def test_deliveries_have_the_names_of_castes_and_kinds_of_food():
+    task = Task(castes={"scout": {}, "guard": {}}, foods={"seed": {}, "leaf": {}})
+    series = Colony(worlds.paper(), task, TRAINING).run(1, 9, measures="deliveries_by").series
+    parts = [name.partition(".")[2] for name in series.values]
+    assert parts == ["nest_0", "food_seed", "food_leaf", "caste_scout", "caste_guard"]
 
 
 def test_your_own_measure_is_read_as_the_others():

@@ -4,8 +4,6 @@ The drawing is that of the vision's tests: ranges (5, 5, 5), the ant A at the or
 in its view L (heading 0), M (heading 1), R (heading 2). Trails do not evaporate.
 """
 
-from __future__ import annotations
-
 import pytest
 from colonies import GAMMA, act, begun, load
 

@@ -1,7 +1,5 @@
 """The colony: when its episodes end, for the colony and for those who learn."""
 
-from __future__ import annotations
-
 import pytest
 from colonies import act, begun, load, training
 

@@ -3,8 +3,6 @@
 In the drawings 0 to 5 are ants with that heading, numbered in reading order; F food, Q the queen.
 """
 
-from __future__ import annotations
-
 import pytest
 from colonies import act, begun, foods_of
 

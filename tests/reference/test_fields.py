@@ -1,7 +1,5 @@
 """Further fields: when and where ants lay them, and ants that follow them, worked by hand."""
 
-from __future__ import annotations
-
 from colonies import act, begun, cells_of, load
 
 from taichi_ants.task import Field, Pheromone

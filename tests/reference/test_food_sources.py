@@ -1,7 +1,5 @@
 """Food that grows back, and food that moves, worked out by hand."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

@@ -1,7 +1,5 @@
 """The reference is independent: it imports nothing of the package but what it may."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 from pathlib import Path

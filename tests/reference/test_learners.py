@@ -3,8 +3,6 @@
 Learning rate and discount are 1/2, unless a test says otherwise, so that all values are exact.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from colonies import GAMMA, training

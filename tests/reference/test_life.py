@@ -1,7 +1,5 @@
 """Births and deaths in a colony, worked out by hand."""
 
-from __future__ import annotations
-
 import pytest
 from colonies import act, begun, cells_of, foods_of, load, n_draws
 

@@ -5,8 +5,6 @@ heading 0 an ant looks up; around it lie, from behind left (heading -2) on: down
 up right, down right, and behind it down.
 """
 
-from __future__ import annotations
-
 import pytest
 from colonies import begun, load
 

@@ -1,7 +1,5 @@
 """What holds after every tick of any colony: food is conserved, no two ants share a cell."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 from colonies import foods_of

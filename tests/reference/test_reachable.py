@@ -1,7 +1,5 @@
 """Of the 128 indices of states exactly 100 can be met, as the paper counts (section 1.5)."""
 
-from __future__ import annotations
-
 import itertools
 
 from hypothesis import given, settings

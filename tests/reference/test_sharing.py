@@ -3,8 +3,6 @@
 Learning rate and discount are 1/2 throughout.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from colonies import GAMMA, act, begun, load, training

@@ -1,7 +1,5 @@
 """Trails: laid by hand-worked deposits, fallen and spread as closed forms say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from colonies import act, begun, load

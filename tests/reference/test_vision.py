@@ -11,8 +11,6 @@ cells in its view
 State = 64 * carries + 16 * left + 4 * forward + right; E 0, O 1, T or S 2, F or Q 3.
 """
 
-from __future__ import annotations
-
 import pytest
 
 from taichi_ants.reference.ants import Ant

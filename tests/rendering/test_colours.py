@@ -1,7 +1,5 @@
 """The ramp is perceptually uniform, and the colours stay apart for everybody."""
 
-from __future__ import annotations
-
 import itertools
 import re
 

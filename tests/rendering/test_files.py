@@ -1,7 +1,5 @@
 """Files of pictures: what is in them, and that they are whole or not there."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The panel, marks of the view and text: what is there, and where it may be."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kernels draw the same picture as a slow reference with many samples per pixel."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

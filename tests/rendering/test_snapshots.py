@@ -1,7 +1,5 @@
 """What is drawn of an episode equals its trace and the reference's world at every step."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

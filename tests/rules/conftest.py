@@ -1,7 +1,5 @@
 """The rules of tests are registered while a file of this folder runs, and forgotten after it."""
 
-from __future__ import annotations
-
 import importlib
 
 import own_rules

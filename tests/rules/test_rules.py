@@ -1,7 +1,5 @@
 """Rules of users: what they may contain, how tasks name them, and refusals in one sentence."""
 
-from __future__ import annotations
-
 import pickle
 import runpy
 from dataclasses import replace

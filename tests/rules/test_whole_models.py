@@ -4,8 +4,6 @@ Each model combines nests, kinds of food, fields, cues, noise, castes, division 
 a learner, rules of users, and a drawn protocol.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 

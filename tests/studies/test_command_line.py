@@ -81,7 +81,11 @@ def fail_with(error):
     [
         (AntsError("the world is flat."), 2, "error: the world is flat.\n"),
         (AntsError("one\ntwo."), 2, "error: one two.\n"),
-        (MemoryError(), 2, "error: the command needs more memory than is available.\n"),
+        (
+            MemoryError("Unable to allocate 64.0 GiB for an array"),
+            2,
+            "error: there is too little memory for this; choose smaller numbers.\n",
+        ),
         (KeyboardInterrupt(), 130, "Halted.\n"),
         (BrokenPipeError(32, "Broken pipe"), 0, ""),
         (

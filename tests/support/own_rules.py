@@ -1,7 +1,5 @@
 """Rules of each kind, which use all inputs and operators; a plugin file for tests."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from taichi_ants import rules

@@ -1,7 +1,5 @@
 """A check that wrong input is refused in one sentence, with the words that a test expects."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

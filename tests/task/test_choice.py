@@ -1,7 +1,5 @@
 """Rules of choice and noise: frequencies of choices, closed forms, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import chisquare

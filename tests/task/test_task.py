@@ -1,7 +1,5 @@
 """What a task can be, how it is written down, and what is refused."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 

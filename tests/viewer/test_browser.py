@@ -1,7 +1,5 @@
 """The page in a real browser: each control, and values that equal the engine's."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The page gives a true reason for what each ant does, or none, under every rule of choice."""
 
-from __future__ import annotations
-
 import pytest
 from browser import Page
 

@@ -1,7 +1,5 @@
 """Recordings hold what the engine and the reference have, at every tick."""
 
-from __future__ import annotations
-
 import html
 import re
 from itertools import pairwise

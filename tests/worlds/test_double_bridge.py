@@ -1,7 +1,5 @@
 """The double bridge, walked breadth first with the reference's geometry."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Regions of worlds: their forms, files, and their names as cells of interventions."""
 
-from __future__ import annotations
-
 import pickle
 
 import pytest

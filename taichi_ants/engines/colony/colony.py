@@ -11,7 +11,7 @@ from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
 from taichi_ants.engines.colony.timetable import Timetable
-from taichi_ants.errors import AntsError, checked_whole, entries_of, shown
+from taichi_ants.errors import AntsError, checked_whole, enough_memory, entries_of, shown
 from taichi_ants.measures.measure import Measure
 from taichi_ants.measures.series import SeriesRecorder, stops
 from taichi_ants.protocol import ProtocolEvent
@@ -67,6 +67,7 @@ class Colony(TickingColony):
     (200, 16)
     """
 
+    @enough_memory("so many episodes")
     def run(
         self,
         episodes: int,

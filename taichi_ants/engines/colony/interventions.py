@@ -29,7 +29,7 @@ from taichi_ants import interventions as language
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_STANDS, COLUMNS, Stage, WorldRow
 from taichi_ants.engines.colony.stepping import TickingColony
-from taichi_ants.errors import AntsError, as_array, count
+from taichi_ants.errors import AntsError, as_array, count, expect
 from taichi_ants.features.cues import arrays_of
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_INTERVENTION
 from taichi_ants.grid.hexgrid import AxialGrid, axial
@@ -368,6 +368,7 @@ class Interventions:
     def __init__(
         self, colony: TickingColony, worlds: Sequence[int] | None = None, lasting: bool = True
     ) -> None:
+        expect("colony", colony, TickingColony)
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None
         n = len(colony.worlds)
@@ -389,6 +390,7 @@ class Interventions:
             AntsError: A world does not allow the change; nothing has changed in any world.
         """
         colony = self.colony
+        expect("the intervention", change, Intervention)
         change.check_in(colony.worlds[self.worlds[0]], colony.task, colony.learns)
         sets_start = self.lasting and isinstance(change, language.SetAnts)
         running = np.flatnonzero(colony.running).tolist() if colony.episode >= 0 else []

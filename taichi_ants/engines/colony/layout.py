@@ -1,7 +1,5 @@
 """Names of the columns, rows and flags in the arrays of a colony."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from enum import IntEnum, auto

@@ -18,7 +18,7 @@ from taichi_ants.engines.colony import food_sources, layout
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import BY_ANT, COLUMNS, NestRow, Order, Stage, WorldRow
 from taichi_ants.engines.layout import compass_of, note_best_actions
-from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole
+from taichi_ants.errors import AntsError, as_array, check_one_of, checked_whole, enough_memory
 from taichi_ants.features import FEATURES, arrays, numbers, used_by, without_files
 from taichi_ants.features.cues import arrays_of
 from taichi_ants.features.feature import ANT, CELL, NEST, Array
@@ -103,6 +103,7 @@ class ColonyState:
         actions = carried = carrying = cells = events = executed = headings = nests = _array
         next_actions = numbers = paper_states = states = _array  # so that editors know them
 
+    @enough_memory("so many worlds, cells or ants")
     def __init__(
         self,
         world: World | Sequence[World],
@@ -329,6 +330,7 @@ class ColonyState:
             of_ants={name: shown[name] for name in OF_ANTS},
             fields=levels,
             counts=self._results().of_world(w),
+            names={f.group: tuple(of) for f in FEATURES if isinstance(of := f.of(self.task), dict)},
             world=self.worlds[w],
             **further,
         )
@@ -369,9 +371,7 @@ class ColonyState:
         self.sizes = {ANT: self.capacity, NEST: self.n_nests, CELL: self.grid.size}
         for feature in FEATURES:
             self.sizes |= {per: of(self) for per, of in feature.spaces.items()}
-        for feature in self._model.features:
-            for refusal in feature.refusals(self):
-                raise AntsError(refusal)
+        arguments.check_features(self.task, worlds, self.sharing)
         self.changed = np.zeros(len(worlds), bool)
         most = max(len(world.foods) for world in worlds)
         self._make_room_for_food(most if self._model.food_changes else 0)

@@ -1,7 +1,5 @@
 """The timetable of a protocol: the ticks at which a run of a colony is cut, and what happens."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

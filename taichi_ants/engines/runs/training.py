@@ -17,7 +17,7 @@ from taichi_ants import arguments, runtime
 from taichi_ants.engines.layout import OUTCOMES, TRACE
 from taichi_ants.engines.runs.engine import MAX_ROLLOUT_STEPS, Progress, Runs, RunState, memory_for
 from taichi_ants.engines.runs.results import RolloutArguments, Rollouts, Trace, TrainingResult
-from taichi_ants.errors import AntsError, checked_whole, expect
+from taichi_ants.errors import AntsError, checked_whole, enough_memory, expect
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import check_finite, checked_table, checked_values
 from taichi_ants.task import Task
@@ -27,6 +27,7 @@ from taichi_ants.worlds.world import World
 MAX_TABLE_ROWS = 12_800_000  # of 32 bytes each; a trace keeps the table after each training step
 
 
+@enough_memory("so many cells, runs or episodes")
 def train(
     world: World,
     configs: TrainingConfig | Sequence[TrainingConfig],
@@ -71,6 +72,7 @@ def train(
     return _train(start, episodes, progress)
 
 
+@enough_memory("so many episodes")
 def continue_training(result: TrainingResult, episodes: int) -> TrainingResult:
     """Return a new result after training every run of a result for more episodes.
 
@@ -124,6 +126,7 @@ def _report(progress: Progress, part: slice, total: int, share: float) -> None:
     progress((part.start + (part.stop - part.start) * share) / total)
 
 
+@enough_memory("so many seeds or rollouts")
 def evaluate(
     world: World,
     q_values: np.ndarray,

@@ -1,7 +1,5 @@
 """The colony equals the plain reference: every tick, every ant, every cell, every bit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The schedule of a GPU, in which each ant has a thread, on the CPU: equal results."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from ctypes.util import find_library

@@ -1,7 +1,5 @@
 """Castes, thresholds and idle ants: what always holds, distributions, files, and refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import kstest, lognorm, truncnorm, uniform

@@ -1,7 +1,5 @@
 """Clear errors of colonies, episodes that end, other worlds for episodes, and memory."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from refusals import refused

@@ -1,7 +1,5 @@
 """Colonies in files and copies: what was saved goes on, and what was changed is refused."""
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle

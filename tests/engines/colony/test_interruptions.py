@@ -1,7 +1,5 @@
 """Ctrl-C in a colony: its counts are those of its worlds, and what is incomplete is refused."""
 
-from __future__ import annotations
-
 import signal
 from typing import Any
 

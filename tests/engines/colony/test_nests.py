@@ -1,7 +1,5 @@
 """Several nests and kinds of food: tables, changes by hand, and refusals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

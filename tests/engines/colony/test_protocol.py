@@ -1,7 +1,5 @@
 """Protocols: kernels equal the reference at each tick, and worlds do not depend on each other."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 

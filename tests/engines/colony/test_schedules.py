@@ -1,7 +1,5 @@
 """What must not matter to a colony: schedule, threads, neighbours in a batch, order, a pause."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import defaultdict

@@ -4,8 +4,6 @@ The ants stand in a row and look along it (heading 0), apart from those that loo
 case runs in the kernels and in the reference.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

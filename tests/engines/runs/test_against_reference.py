@@ -1,7 +1,5 @@
 """The engine of independent runs equals the plain reference: every step, every bit."""
 
-from __future__ import annotations
-
 from itertools import cycle
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What training and evaluation refuse, each with the value named, and what they accept."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from refusals import refused
@@ -20,7 +18,6 @@ from taichi_ants.worlds import paper
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
 PLANS = TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=2)
 UNKNOWN = TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99)
-WITH_N = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99, n=7)
 TABLES = np.zeros((3, 128, 5))
 
 
@@ -48,7 +45,6 @@ def of_world(world):
         ([lambda: train(paper(), [], 0)], "configs is []"),
         ([lambda: train(paper(), [CONFIG, None], 0)], "the configuration is None"),
         ([lambda: train(paper(), UNKNOWN, 0)], "there is no learner 'td_zero'"),
-        ([lambda: train(paper(), WITH_N, 0)], "`training.n` is not a setting of sarsa"),
         ([lambda: continue_training(None, 2)], "result is None; it must be a TrainingResult"),
         (of_seeds([]), "seeds is empty"),
         (of_seeds(0.5), "a seed is 0.5"),

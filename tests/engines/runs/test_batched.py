@@ -1,7 +1,5 @@
 """Batched environments equal the plain reference: every step, whatever they are told to do."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from colonies import act, training

@@ -1,7 +1,5 @@
 """What training returns: kept in files, compared, printed, and not mixed up."""
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle
