@@ -38,8 +38,9 @@ class ThreadChoice:
     the next higher number in turn. A trial is three short launches with the other number. The first
     does not count, because threads that have rested wake up late, and of the others only the faster
     one, because all threads wait if one is interrupted. Trials take at most `_TRIAL_SHARE` of all
-    time, except the first launch with each number: on processors that other programs use, fewer
-    threads can be many times faster.
+    time, and much less with a number that was slower, because threads that have rested also delay
+    the next launches. Only the first launch with each number is extra: on processors that other
+    programs use, fewer threads can be many times faster.
     """
 
     def __init__(self, most: int = 1) -> None:
@@ -58,18 +59,20 @@ class ThreadChoice:
         """Return the number of ticks for the next launch, and of threads, up to `most`."""
         if most != self.numbers[-1]:
             vars(self).update(vars(ThreadChoice(most)))
-        if not self._left and self.recent and most > 1:
-            step = -self._step if 0 <= self.at - self._step < len(self.numbers) else self._step
+        if not self._left and self.recent:
             pace = statistics.median(self.recent)
             self._ticks = max(1, round(_TRIAL_SECONDS / pace))
-            expected = self.tried.get(self.at + step, pace / 4)
-            if _TRIAL_LAUNCHES * min(ticks, self._ticks) * expected <= self.allowance:
-                self._left, self._step = _TRIAL_LAUNCHES, step
+            for step in (-self._step, self._step):
+                slower = self.tried.get(self.at + step, pace / 4) / pace
+                cost = _TRIAL_LAUNCHES * min(ticks, self._ticks) * pace * slower**2
+                if 0 <= self.at + step < len(self.numbers) and cost <= self.allowance:
+                    self._left, self._step = _TRIAL_LAUNCHES, step
+                    break
         if self._left:
             return min(ticks, self._ticks), self.numbers[self.at + self._step]
         return ticks, self.numbers[self.at]
 
-    def note(self, ticks: int, threads: int, seconds: float) -> None:
+    def note(self, ticks: int, seconds: float) -> None:
         """Take notice of the time of a launch that followed the last plan."""
         pace, other = seconds / ticks, self.at + self._step
         self.allowance += _TRIAL_SHARE * seconds
@@ -271,7 +274,7 @@ class TickingColony(ColonyState):
             compiled, began = "ticks" in self._launches, time.perf_counter()
             self._launch_parts("ticks", piece, threads)
             if compiled:
-                self._choice.note(piece, threads, time.perf_counter() - began)
+                self._choice.note(piece, time.perf_counter() - began)
 
     def _advance_by_ant(self, n: int) -> None:
         """Advance by n ticks of one or several launches each."""
