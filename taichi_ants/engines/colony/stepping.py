@@ -25,9 +25,9 @@ _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _SORT_SECONDS = 0.25  # about the time in which Taichi loads the kernel that sorts
 _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # checks of a thread at a barrier, which take at least half a second
-# Trials of another number of threads: seconds in a launch, the share of all time, and the log of
-# the gain in speed for which the number changes.
-_TRIAL_SECONDS, _TRIAL_SHARE, _LEAST_GAIN = 0.01, 0.03, 0.03
+# Trials of another number of threads: seconds in a launch, launches, the share of all time, and the
+# log of the gain in speed for which the number changes.
+_TRIAL_SECONDS, _TRIAL_LAUNCHES, _TRIAL_SHARE, _LEAST_GAIN = 0.01, 3, 0.03, 0.03
 
 
 class ThreadChoice:
@@ -35,57 +35,62 @@ class ThreadChoice:
 
     Threads that share a tick wait for each other several times, and they wait long if other
     programs use the processors. So the choice starts with all threads, and tries the next lower and
-    the next higher number in turn. A trial is two short launches with the other number and two with
-    the present number. The first of each does not count, because threads that have rested wake up
-    late. Nor does a pause of a thread in the last one, see `recent`. The launches with the other
-    number take at most `_TRIAL_SHARE` of all time, except the first one with each number: if other
-    programs use the processors, fewer threads can be many times faster.
+    the next higher number in turn. A trial is three short launches with the other number. The first
+    does not count, because threads that have rested wake up late, and of the others only the faster
+    one, because all threads wait if one is interrupted. Trials take at most `_TRIAL_SHARE` of all
+    time, and much less with a number that was slower, because threads that have rested also delay
+    the next launches. Only the first launch with each number is extra: on processors that other
+    programs use, fewer threads can be many times faster.
     """
 
     def __init__(self, most: int = 1) -> None:
         self.numbers = (*(2**i for i in range((most - 1).bit_length())), most)
         self.at = len(self.numbers) - 1  # the place of the present number
         self.gains: dict[int, float] = {}  # by place: log of the speed relative to the present one
-        self.seconds_per_tick: dict[int, float] = {}  # by number of threads, the last ones
-        self.recent: list[float] = []  # the last ones with the present number
+        self.tried: dict[int, float] = {}  # by place: seconds per tick in the last trial
+        self.recent: list[float] = []  # seconds per tick of the last launches between trials
         self.allowance = 0.0  # seconds that trials may take by now
         self._step = 1  # to the neighbour that was tried last, then the other one
-        self._pending: list[int] = []  # the places of a trial's launches that are left
+        self._left = 0  # launches of a trial that are left
         self._ticks = 1  # in each of them
-        self._tried = 1.0  # seconds per tick with the other number
+        self._rested = False  # whether a trial has just ended
 
     def plan(self, ticks: int, most: int) -> tuple[int, int]:
         """Return the number of ticks for the next launch, and of threads, up to `most`."""
         if most != self.numbers[-1]:
             vars(self).update(vars(ThreadChoice(most)))
-        pace = self.seconds_per_tick.get(self.numbers[self.at])
-        if not self._pending and pace is not None and most > 1:
-            step = -self._step if 0 <= self.at - self._step < len(self.numbers) else self._step
-            other, self._ticks = self.at + step, max(1, min(ticks, round(_TRIAL_SECONDS / pace)))
-            expected = self.seconds_per_tick.get(self.numbers[other], pace / 4)
-            if 2 * self._ticks * expected <= self.allowance:
-                self._pending, self._step = [other, other, self.at, self.at], step
-        if self._pending:
-            return min(ticks, self._ticks), self.numbers[self._pending[0]]
+        if not self._left and self.recent:
+            pace = statistics.median(self.recent)
+            self._ticks = max(1, round(_TRIAL_SECONDS / pace))
+            for step in (-self._step, self._step):
+                slower = self.tried.get(self.at + step, pace / 4) / pace
+                cost = _TRIAL_LAUNCHES * min(ticks, self._ticks) * pace * slower**2
+                if 0 <= self.at + step < len(self.numbers) and cost <= self.allowance:
+                    self._left, self._step = _TRIAL_LAUNCHES, step
+                    break
+        if self._left:
+            return min(ticks, self._ticks), self.numbers[self.at + self._step]
         return ticks, self.numbers[self.at]
 
-    def note(self, ticks: int, threads: int, seconds: float) -> None:
+    def note(self, ticks: int, seconds: float) -> None:
         """Take notice of the time of a launch that followed the last plan."""
-        pace = seconds / ticks
+        pace, other = seconds / ticks, self.at + self._step
         self.allowance += _TRIAL_SHARE * seconds
-        if len(self._pending) > 2:
-            self.allowance -= seconds if threads in self.seconds_per_tick else 0.0
-            self._tried = pace
-        else:
-            self.recent = [*self.recent[-8:], pace]
-        if len(self._pending) == 1:
-            other = self.at + self._step
-            gain = math.log(min(pace, statistics.median(self.recent)) / self._tried)
+        if not self._left:
+            if not self._rested:
+                self.recent = [*self.recent[-4:], pace]
+            self._rested = False
+            return
+        self.allowance -= seconds if other in self.tried else 0.0
+        counts = self._left < _TRIAL_LAUNCHES - 1  # the first two give a pace to compare with
+        self.tried[other] = min(pace, self.tried[other]) if counts else pace
+        self._left -= 1
+        self._rested = not self._left
+        if self._rested:
+            gain = math.log(statistics.median(self.recent) / self.tried[other])
             self.gains[other] = gain + self.gains.get(other, 0.0) / 2
             if self.gains[other] > _LEAST_GAIN:
-                self.at, self.gains, self.recent = other, {}, [self._tried]
-        self.seconds_per_tick[threads] = pace
-        self._pending = self._pending[1:]
+                self.at, self.gains, self.recent = other, {}, [self.tried[other]]
 
 
 class TickingColony(ColonyState):
@@ -269,7 +274,7 @@ class TickingColony(ColonyState):
             compiled, began = "ticks" in self._launches, time.perf_counter()
             self._launch_parts("ticks", piece, threads)
             if compiled:
-                self._choice.note(piece, threads, time.perf_counter() - began)
+                self._choice.note(piece, time.perf_counter() - began)
 
     def _advance_by_ant(self, n: int) -> None:
         """Advance by n ticks of one or several launches each."""

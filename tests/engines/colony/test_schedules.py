@@ -143,19 +143,19 @@ def test_threads_are_chosen_by_short_trials(best):
         seconds = ticks * 2e-4 * 1.2**steps * rng.uniform(1, 1.2)
         in_trials += seconds * (threads != choice.numbers[choice.at])
         passed += seconds
-        choice.note(ticks, threads, seconds)
+        choice.note(ticks, seconds)
     assert in_trials <= 0.03 * passed + 0.02 * len(numbers)  # the first launches are extra
     assert choice.numbers[choice.at] == best
 
 
 def test_pauses_of_threads_do_not_change_their_number():
-    """Half of the threads are two thirds as fast, but one launch in ten takes three times as long."""
+    """Half of the threads are two thirds as fast, but one launch in ten takes three times longer."""
     choice, rng, passed, ticks = ThreadChoice(), np.random.default_rng(1), {1: 0.0, 2: 0.0}, 0
     while sum(passed.values()) < 60:
         ticks, threads = choice.plan(16, 2)
         seconds = ticks * 0.03 / (threads + 1) * (3 if rng.random() < 0.1 else 1)
         passed[threads] += seconds
-        choice.note(ticks, threads, seconds)
+        choice.note(ticks, seconds)
     assert passed[1] < 0.05 * passed[2]
 
 
@@ -165,7 +165,7 @@ def test_fewer_threads_are_tried_early():
     while choice.numbers[choice.at] > 1:
         ticks, threads = choice.plan(16, 2)
         passed += (seconds := ticks * (0.1, 0.4)[threads - 1])
-        choice.note(ticks, threads, seconds)
+        choice.note(ticks, seconds)
     assert passed < 10
 
 
