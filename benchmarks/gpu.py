@@ -26,6 +26,7 @@ from measuring import ROOT, a_ratio, machine, pace, show
 
 from taichi_ants import AntsError, Task, runtime, train, worlds
 from taichi_ants.analysis.tables import Table, figure
+from taichi_ants.engines.colony import stepping
 from taichi_ants.envs.forage import HexForageVectorEnv, Rollout
 from taichi_ants.studies.command_line import Parser, run_command
 
@@ -75,8 +76,9 @@ def training(learner: str) -> Iterator[str]:
         yield from (record.of_training(made), record.recorded()[1][name])
 
 
-def colony(group: str) -> Iterator[str]:
+def colony(group: str, most_in_one_loop: int) -> Iterator[str]:
     """Yield the hash of a colony, and the one recorded."""
+    stepping._MOST_IN_ONE_LOOP = most_in_one_loop
     for name, drawn in record.drawing.colonies_of(group, 1):
         yield from (record.of_colony(drawn, "by_ant"), record.recorded()[1][name])
 
@@ -149,10 +151,12 @@ SPEEDS: dict[str, tuple[float | None, Callable[[], float]]] = {
 
 def cases(expected: str) -> dict[str, Callable[[], Iterator[str]]]:
     """Return functions that yield a hash and that of a CPU; `expected` is that of environments."""
+    groups = record.drawing.GROUPS
     return {
         "environments": lambda: iter((environments(), expected)),
         **{f"training: {name}": partial(training, name) for name in record.TRAINED},
-        **{f"colony: {group}": partial(colony, group) for group in record.drawing.GROUPS},
+        **{f"colony: {group}": partial(colony, group, 10**9) for group in groups},
+        **{f"colony by loops: {group}": partial(colony, group, 0) for group in groups},
     }
 
 
@@ -216,7 +220,8 @@ def measured(seconds: float, on_cpu: bool, word: str) -> list[Table]:
         for row in speeds(bandwidth):
             print(*row, sep="  ", flush=True)
             paces.append(row)
-    results = [summary(kind, dict(rows)) for kind in ("environments", "training", "colony")]
+    kinds = "environments", "training", "colony:", "colony by loops"
+    results = [summary(kind, dict(rows)) for kind in kinds]
     about = f"{name}: {machine(('taichi', 'numpy'))}"
     columns = ["", "cases", "equal to a CPU's", "others"]
     made = [Table("Results of kernels for a GPU", columns, results, [about])]
@@ -229,7 +234,7 @@ def summary(kind: str, results: dict[str, str]) -> list[str]:
     """Return the row of all cases of a kind: how many are equal, and the others."""
     found = {case: result for case, result in results.items() if case.startswith(kind)}
     others = [f"{case}: {result}" for case, result in found.items() if result != "equal"]
-    return [kind, str(len(found)), str(len(found) - len(others)), "; ".join(others)]
+    return [kind.rstrip(":"), str(len(found)), str(len(found) - len(others)), "; ".join(others)]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

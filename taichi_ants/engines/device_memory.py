@@ -17,6 +17,8 @@ import taichi as ti
 
 from taichi_ants.errors import AntsError
 
+_MULTIPROCESSORS = 16  # CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT
+
 
 def room_for(array: np.ndarray) -> ti.Ndarray:
     """Return an array of zeros on the device, of the shape and type of a NumPy array."""
@@ -57,6 +59,15 @@ def _copy(to: int, source: int, size: int, function: str) -> None:
     status = copy(ctypes.c_void_p(to), ctypes.c_void_p(source), ctypes.c_size_t(size))
     if status:
         raise AntsError(f"the GPU cannot copy {size} bytes: its driver reports error {status}.")
+
+
+def multiprocessors() -> int:
+    """Return the number of multiprocessors of the GPU on which Taichi runs, or 0 on a CPU."""
+    device, number = ctypes.c_int(), ctypes.c_int()
+    if ti.lang.impl.current_cfg().arch == ti.cuda:
+        _driver().cuCtxGetDevice(ctypes.byref(device))
+        _driver().cuDeviceGetAttribute(ctypes.byref(number), _MULTIPROCESSORS, device)
+    return number.value
 
 
 @cache

@@ -70,3 +70,19 @@ def wait_for_all(c, part, parts, number):
             opened -= ti.i64(layout.GAVE_UP)
         goes_on = ti.cast(opened > number, ti.i32)
     return goes_on
+
+
+@function
+def wait_for_blocks(c, thread, arrivals):
+    """Wait, on a GPU, until all blocks of threads have arrived; `thread` is that of its block.
+
+    The fences make others see what this block wrote, and this one what others wrote.
+    """
+    ti.simt.block.sync()
+    if thread == 0:
+        ti.simt.grid.memfence()
+        ti.atomic_add(c.barrier[Barrier.ARRIVED], 1)
+        while ti.atomic_add(c.barrier[Barrier.ARRIVED], 0) < arrivals:
+            pass
+        ti.simt.grid.memfence()
+    ti.simt.block.sync()

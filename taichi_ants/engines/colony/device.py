@@ -17,7 +17,6 @@ from taichi_ants.errors import AntsError
 
 _LINE = 128  # an array begins at a multiple of this, as GPUs read memory in lines of 128 bytes
 _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
-_OF_THREADS = "orders", "barrier"  # which only kernels of other schedules read
 
 
 class DeviceArrays(Mapping[str, np.ndarray]):
@@ -79,7 +78,7 @@ class DeviceArrays(Mapping[str, np.ndarray]):
             self._lay_out(numbers)
         if numbers != self._numbers:
             self._write_numbers(numbers)
-        for name in self._changed.difference(_OF_THREADS):
+        for name in self._changed:
             kind, place = self._places[name]
             copy_in(self._arrays[name], self._memories[kind], place)
         self._changed.clear()
@@ -104,16 +103,15 @@ class DeviceArrays(Mapping[str, np.ndarray]):
 
     def _lay_out(self, numbers: Mapping[str, Any]) -> None:
         """Make memories with room for all numbers and arrays."""
-        ours = {name: one for name, one in self._arrays.items() if name not in _OF_THREADS}
         self._contents = Contents(
             tuple((name, type_of(number)[0]) for name, number in numbers.items()),
-            tuple((name, *type_of(array)) for name, array in ours.items()),
+            tuple((name, *type_of(array)) for name, array in self._arrays.items()),
         )
         ends = {kind: len(names) for kind, names in self._contents.heads().items()}
         self._places: dict[str, tuple[str, int]] = {}
         for name, kind, _ in self._contents.arrays:
             place = -(-ends[kind] // _LINE) * _LINE
-            self._places[name], ends[kind] = (kind, place), place + ours[name].size
+            self._places[name], ends[kind] = (kind, place), place + self._arrays[name].size
         for kind, end in ends.items():
             if end > _MOST_NUMBERS:
                 raise AntsError(
@@ -124,7 +122,7 @@ class DeviceArrays(Mapping[str, np.ndarray]):
             kind: ti.ndarray(getattr(ti, kind), max(1, end)) for kind, end in ends.items()
         }
         self._numbers: dict[str, Any] = {}
-        self._changed.update(ours)
+        self._changed.update(self._arrays)
 
     def _write_numbers(self, numbers: Mapping[str, Any]) -> None:
         """Write the numbers of kernels to the device, and the places and shapes of arrays."""

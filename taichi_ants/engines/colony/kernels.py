@@ -7,7 +7,7 @@ parallel loop. All do the same phases in the same order and give the same number
 of `taichi_ants.reference.ReferenceColony.tick`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache, partial
 from itertools import groupby
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
 from taichi_ants.engines.colony import layout, learning, life, memory, own_inputs, steps, trail
-from taichi_ants.engines.colony.barrier import next_group, part_of, share_of_part
+from taichi_ants.engines.colony.barrier import next_group, part_of, share_of_part, wait_for_blocks
 from taichi_ants.engines.colony.columns import chunks_of, function, share_of, trait
 from taichi_ants.engines.colony.layout import Order, WorldRow
 from taichi_ants.engines.colony.views import entries_of
@@ -28,6 +28,7 @@ from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
 from taichi_ants.task.rules.policy import BY_LEVELS, BY_VALUES
 
+THREADS_OF_BLOCK = 256  # in `in_one_loop`
 ANTS, CELLS, STATES, SUMS, WORLD = "ants", "cells", "states", "sums", "world"
 
 
@@ -243,6 +244,15 @@ def do_one(phase, c, v, i):
             phase.do(c, v, w, tick)
 
 
+def loops_of(groups: Iterable[Group]) -> tuple[tuple[str, Group], ...]:
+    """Return what loops go over, and the phases of each; none uses what others change in it."""
+    return tuple(
+        (of, tuple(phases))
+        for group in groups
+        for of, phases in groupby(group, lambda phase: phase.of)
+    )
+
+
 @cache
 def by_ant(v: Variant, name: str, contents: memory.Contents, arguments: Any) -> Callable[..., None]:
     """Return a kernel with a parallel loop for each phase, or for several of a group."""
@@ -253,11 +263,7 @@ def by_ant(v: Variant, name: str, contents: memory.Contents, arguments: Any) -> 
         groups += planning_groups(v)
     if name in ("tick", "last"):
         groups += last_groups(v)
-    loops = tuple(
-        (of, tuple(phases))
-        for group in groups
-        for of, phases in groupby(group, lambda phase: phase.of)
-    )
+    loops = loops_of(groups)
 
     @while_compiling
     def lengths_of(memories: Any) -> dict[str, Any]:
@@ -273,6 +279,53 @@ def by_ant(v: Variant, name: str, contents: memory.Contents, arguments: Any) -> 
                 colony = memory.view_of(contents, c)
                 for phase in ti.static(phases):
                     do_one(phase, colony, v, i)
+
+    return advance_colony
+
+
+@cache
+def in_one_loop(
+    v: Variant, blocks: int, contents: memory.Contents, arguments: Any
+) -> Callable[..., None]:
+    """Return a kernel of whole ticks in a single parallel loop, for a colony of few ants.
+
+    A GPU takes about 70 microseconds to start the loops of a tick one after another. Here, its
+    threads wait for each other after each loop. All run at the same time, because there are as many
+    `blocks` of them as the GPU has multiprocessors. Without blocks, on a CPU, one thread does all.
+    """
+    groups, planning, last = (
+        loops_of(some(v)) for some in (tick_groups, planning_groups, last_groups)
+    )
+    width = THREADS_OF_BLOCK if blocks else 1
+    threads = max(1, blocks) * width
+
+    @function
+    def share(loops: ti.template(), c, thread, passed):
+        """Do a thread's share of loops, waiting after each; return how many loops were done."""
+        done = passed
+        for of, phases in ti.static(loops):
+            i, end = thread, c.n_worlds * entries_in_world(of, c, v)
+            while i < end:
+                for phase in ti.static(phases):
+                    do_one(phase, c, v, i)
+                i += threads
+            done += 1
+            if ti.static(blocks > 0):
+                wait_for_blocks(c, thread % width, done * blocks)
+        return done
+
+    @ti.kernel
+    def advance_colony(c: arguments):
+        ti.loop_config(block_dim=width)
+        for thread in range(threads):
+            colony = memory.view_of(contents, c)
+            done = 0
+            for _ in range(colony.orders[Order.TICKS]):
+                done = share(groups, colony, thread, done)
+                if ti.static(v.plans_together):
+                    for _round in range(colony.planning_steps):
+                        done = share(planning, colony, thread, done)
+                done = share(last, colony, thread, done)
 
     return advance_colony
 

@@ -23,6 +23,7 @@ from taichi_ants.worlds.world import World
 # Ants are sorted after this many steps of all ants, within limits in ticks.
 _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _SORT_SECONDS = 0.25  # about the time in which Taichi loads the kernel that sorts
+_MOST_IN_ONE_LOOP = 65_536  # entries, such as ants, for which a GPU is faster with one loop
 _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # checks of a thread at a barrier, which take at least half a second
 # Trials of another number of threads: seconds in a launch, launches, the share of all time, and the
@@ -277,12 +278,15 @@ class TickingColony(ColonyState):
                 self._choice.note(piece, time.perf_counter() - began)
 
     def _advance_by_ant(self, n: int) -> None:
-        """Advance by n ticks of one or several launches each."""
-        names = ["tick"]
-        if self._model.plans_together:
-            names = ["first", *["planning"] * self.training.planning_steps, "last"]
+        """Advance by n ticks: all in one launch if the colony is small, else by their loops."""
+        names = ["tick"] * n
+        if self._entries <= _MOST_IN_ONE_LOOP:
+            self.arrays["orders"][Order.TICKS], self.arrays["barrier"][:] = n, 0
+            names = ["ticks"]
+        elif self._model.plans_together:
+            names = ["first", *["planning"] * self.training.planning_steps, "last"] * n
         ready, self.ready = self.ready, np.zeros_like(self.ready)  # in case of Ctrl-C
-        self._launch_by_ant(names * n)
+        self._launch_by_ant(names)
         self.ticks += n
         self.ready = ready
 
@@ -291,12 +295,16 @@ class TickingColony(ColonyState):
         import taichi as ti
 
         from taichi_ants.engines.colony import kernels
+        from taichi_ants.engines.device_memory import multiprocessors
         from taichi_ants.engines.launch import Launch
 
         contents, memories = self.arrays.on_device(kernel_numbers(self) | {"places": self.chunks})
         for name in names:
             if (name, contents) not in self._launches:
                 kernel_of = partial(kernels.by_ant, self._variant, name, contents)
+                if name == "ticks":
+                    blocks = multiprocessors()
+                    kernel_of = partial(kernels.in_one_loop, self._variant, blocks, contents)
                 self._launches[name, contents] = Launch(kernel_of)
             self._launches[name, contents](memories)
         ti.sync()
@@ -337,6 +345,12 @@ class TickingColony(ColonyState):
             values = {name: values[name] for name in read}
             values |= {"near_bits": self._near_bits, **self._scratch}
         self._launches[name](values)
+
+    @property
+    def _entries(self) -> int:
+        """The length of the longest loop of a tick in which each entry has a thread."""
+        cells = self.grid.size * any(self._model.dense_by_number)
+        return len(self.seeds) * max(self.capacity, cells, self._shared_rows * self.chunks)
 
     @property
     def _variant(self) -> Any:

@@ -11,7 +11,7 @@ import record
 from interrupts import interrupted_after_launch
 
 from taichi_ants import AntsError, Colony, TrainingConfig, runtime, task, worlds
-from taichi_ants.engines.colony import layout
+from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.layout import BY_ANT, schedule_of
 
 QUICK = "nests", "castes_fields"
@@ -52,8 +52,10 @@ def assert_same(one: Colony, other: Colony) -> None:
     assert one.outcome() == other.outcome()
 
 
+@pytest.mark.parametrize("most", [0, 10**9], ids=["loops", "one_loop"])
 @pytest.mark.parametrize("group", MARKED)
-def test_drawn_colonies_have_the_recorded_hashes(group):
+def test_drawn_colonies_have_the_recorded_hashes(group, most, monkeypatch):
+    monkeypatch.setattr(stepping, "_MOST_IN_ONE_LOOP", most)
     for name, drawn in drawing.colonies_of(group, 1):  # their rules are registered meanwhile
         assert record.of_colony(drawn, BY_ANT) == record.recorded()[1][name]
 
@@ -61,6 +63,7 @@ def test_drawn_colonies_have_the_recorded_hashes(group):
 @pytest.mark.parametrize(("ants", "ants_of_place"), [(8, 3), (1000, 1000), (1000, 16)])
 def test_threads_add_to_the_same_sums_in_any_order(ants, ants_of_place, monkeypatch):
     """Also many ants, all into one place."""
+    monkeypatch.setattr(stepping, "_MOST_IN_ONE_LOOP", 0)
     monkeypatch.setattr(layout, "ANTS_OF_PLACE", ants_of_place)
     colony, expected = made(ants=ants), made("by_world", ants)
     for one in (colony, expected):
@@ -68,12 +71,16 @@ def test_threads_add_to_the_same_sums_in_any_order(ants, ants_of_place, monkeypa
     assert_same(colony, expected)
 
 
-def test_a_launch_has_few_arguments():
+def test_a_launch_has_few_arguments(monkeypatch):
     """Those of the other schedules have more than a GPU allows."""
     colony, other = made(), made("by_world")
+    colony.tick(30)
+    assert {name for name, _ in colony._launches} == {"begin", "ticks"}
+    monkeypatch.setattr(stepping, "_MOST_IN_ONE_LOOP", 0)
     for one in (colony, other):
         one.tick()
-    assert {name for name, _ in colony._launches} == {"begin", "first", "planning", "last"}
+    loops = {"first", "planning", "last"}
+    assert {name for name, _ in colony._launches} == {"begin", "ticks", *loops}
     assert max(len(launch._known) for launch in colony._launches.values()) <= MOST_ARGUMENTS
     assert len(other._launches["ticks"]._known) > MOST_ARGUMENTS
 
@@ -119,8 +126,8 @@ def test_copies_and_files_have_what_is_on_the_device(tmp_path):
 def test_a_tick_that_was_interrupted_ends_the_episode():
     colony = made()
     colony.tick(2)
-    with interrupted_after_launch(3):
-        colony.tick(4)
+    with interrupted_after_launch(2):
+        colony.tick(40)
     for use in (colony.tick, colony.snapshot):
         with pytest.raises(AntsError, match=r"interrupted; call begin_episode first\.$"):
             use()

@@ -149,7 +149,7 @@ def test_threads_are_chosen_by_short_trials(best):
 
 
 def test_pauses_of_threads_do_not_change_their_number():
-    """Half of the threads are two thirds as fast, but every tenth launch takes three times longer."""
+    """One thread is slower than two, of which one launch in ten takes three times as long."""
     choice, rng, passed, ticks = ThreadChoice(), np.random.default_rng(1), {1: 0.0, 2: 0.0}, 0
     while sum(passed.values()) < 60:
         ticks, threads = choice.plan(16, 2)
