@@ -70,7 +70,6 @@ class LoneAnts(Ants):
         if seed_of:
             self.batched.seed(list(seed_of.values()), np.array(list(seed_of)))
         self.batched.step(0, np.where(which, Command.BEGIN, Command.WAIT))
-        self.batched.arrays["commands"][:] = Command.STEP  # of `step_alone`
 
     def advance(self, actions: np.ndarray, waiting: np.ndarray) -> vector.Step:
         begins = waiting if self.mode is AutoresetMode.NEXT_STEP else 0
@@ -170,7 +169,6 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
 
     metadata = vector.METADATA
     _ants: LoneAnts
-    _over = True
 
     def __init__(
         self,
@@ -198,7 +196,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         if seed is None and not self._ants.begun:
             seed = int(self.np_random.integers(2**63))
         self._ants.begin(np.ones(1, bool), [seed])
-        self._ants.begun, self._over = True, False
+        self._ants.begun = True
         results = self._ants.batched.alone.tobytes()
         seen, *_, mask, info = self._ants.outcomes.get(results) or self._ants.outcome(results)
         return seen.copy(), {**info, "action_mask": mask.copy()}
@@ -213,17 +211,17 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
             ResetNeeded: No episode has begun, or it has ended.
             InvalidAction: The action does not exist.
         """
-        if self._over:  # also before the first episode
-            self._ants.check_begun("step()")
+        ants = self._ants
+        batched = ants.batched
+        if batched.alone[2] >= TRUNCATED:  # the result; also before the first episode
+            ants.check_begun("step()")
             raise ResetNeeded("the episode has ended; call reset() before step().")
         known = type(action) in _WHOLE and 0 <= action < N_ACTIONS
         if not known and not self.action_space.contains(action):  # which takes a microsecond
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
-        ants = self._ants
-        results = ants.batched.step_alone(action)
+        results = batched.step_alone(action)
         outcome = ants.outcomes.get(results) or ants.outcome(results)
         seen, reward, terminated, truncated, mask, info = outcome
-        self._over = terminated or truncated
         info = info.copy()
         info["action_mask"] = mask.copy()
         return seen.copy(), reward, terminated, truncated, info

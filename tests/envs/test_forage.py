@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import gymnasium
@@ -127,6 +128,30 @@ def test_copies_go_on_alike(copied):
             one, other = env.step(action), twin.step(action)
             for part in range(4):
                 np.testing.assert_array_equal(one[part], other[part])
+
+
+def test_callers_own_what_an_environment_returns():
+    """Later steps leave it as it is, and changes of it have no effect on later steps."""
+    env, actions = HexForageEnv(), [1, 1, 0, 2, 3, 4] * 3
+    env.reset(seed=0)
+    expected = [str(env.step(action)) for action in actions]
+    for _ in range(2):
+        returned = [(*env.reset(seed=0),), *map(env.step, actions)]
+        assert [str(one) for one in returned[1:]] == expected
+        for seen, *_, info in returned:
+            seen.fill(7)
+            info["action_mask"].fill(7)
+            info.clear()
+
+
+def test_each_thread_steps_its_own_environment():
+    def played(seed: int) -> str:
+        env = HexForageEnv(SMALL[seed % 2], delivery="continues", max_steps=3000)
+        return str([env.reset(seed=seed), *map(env.step, [3, 1, 4, 1, 0, 2, 1] * 400)])
+
+    expected = list(map(played, range(4)))
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(played, range(4))) == expected
 
 
 def test_pictures_show_the_world_as_it_is():

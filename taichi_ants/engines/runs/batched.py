@@ -100,7 +100,8 @@ class BatchedEnvironments:
         self.arrays, memory = layout.split(self._joined), self._joined["memory"]
         self.arrays["random_states"] = self.arrays["random_states"].view(np.uint64)
         self.arrays["cells"] = memory[self._numbers["cells_at"] :]
-        self._taken = memoryview(memory[self._joined["taken_at"] :])
+        # "taken" and "commands" of a single ant as one number.
+        self._given = memoryview(memory[self._joined["taken_at"] :][:2].view(np.int64))
         self._single: Any = None  # the launch of a step
         self.alone = memoryview(memory[self._joined[f"{_RESULTS[0]}_at"] :][: len(_RESULTS)])
         self._arguments = {**self._joined, **self._numbers}
@@ -135,8 +136,8 @@ class BatchedEnvironments:
         self._single.repeat(self._of_steps)
 
     def step_alone(self, action: int) -> bytes:
-        """Let the only ant, whose command is STEP, act; return its `alone` after the step."""
-        self._taken[0] = action
+        """Let the only ant, whose episode has begun, act; return its `alone` after the step."""
+        self._given[0] = action  # and the command STEP, which is 0
         (self._single or self._launch(False, 0)).repeat(self._of_steps)
         return self.alone.tobytes()
 
