@@ -88,8 +88,7 @@ class LoneAnts(Ants):
         info = {name: numbers[0] for name, numbers in self.facts().items()}
         reward, *over = (numbers.item() for numbers in self._results())
         seen, mask = self.shown.table[info["state"]], info["action_mask"]
-        self.outcomes[results] = outcome = (seen, reward, *over, mask, info)
-        return outcome
+        return self.outcomes.setdefault(results, (seen, reward, *over, mask, info))
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "outcomes": {}}

@@ -200,10 +200,7 @@ def test_wrong_steps_raise_what_gymnasium_raises():
     [
         ({"world": "nowhere"}, "there is no world 'nowhere'"),
         ({"world": [SMALL[0], worlds.paper()], "num_envs": 2}, "give worlds of one size"),
-        (
-            {"world": SMALL, "num_envs": 2},
-            ", or a list of 1 to 2 of them.",
-        ),
+        ({"world": SMALL, "num_envs": 2}, ", or a list of 1 to 2 of them."),
         ({"task": "maze"}, "task is 'maze'; it must be one of paper, fetching,"),
         ({"delivery": "never"}, "delivery is 'never'"),
         ({"max_steps": 0}, "max_steps is 0"),
