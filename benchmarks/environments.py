@@ -1,9 +1,9 @@
 """Compare the speed of environments with that of the engine of `taichi_ants.train`, and CartPole.
 
 All ants act at random in the paper's world. The first table has single environments, as
-`gymnasium.make` returns them: ours; CartPole, one of Gymnasium's own; and what no environment that
-launches a compiled kernel can avoid, the launch of an empty kernel with one array and Gymnasium's
-wrappers. The second has vector environments. `step` and `rollout` get actions that were drawn
+`gymnasium.make` returns them: ours; CartPole, one of Gymnasium's own; and the launch of an empty
+kernel with one array, in the wrappers that `gymnasium.make` adds by default, and which ours does
+without. The second has vector environments. `step` and `rollout` get actions that were drawn
 before. "policy" is a rollout that draws them itself, as the engine does, with epsilon 1. Rollouts
 have up to two million steps of all environments. The command measures all in turn, several times.
 Ratios are medians of those within a round, by the processor time of all threads together, which

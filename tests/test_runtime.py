@@ -183,7 +183,7 @@ def halves(serial, arguments):
     def halve(a: arguments):
         ti.loop_config(serialize=serial)
         for i in range(4):
-            a.numbers[i] = a.numbers[i] * 0.5
+            a[i] = a[i] * 0.5
     return halve
 
 for serial in (True, False):

@@ -10,6 +10,7 @@ from weakref import finalize, ref
 
 import numpy as np
 import taichi as ti
+from taichi._lib import core
 from taichi.lang import impl
 from taichi.lang.argpack import ArgPack
 from taichi.types import ndarray_type
@@ -21,13 +22,15 @@ from taichi_ants.errors import AntsError
 
 _ARRAYS = np.ndarray, ti.Ndarray
 _ZERO = "zero"  # the number in packs for the guards
+_launch_kernel = core.Program.launch_kernel.__func__  # a call of the method takes 0.06 us longer
 
 
 class Launch:
-    """A kernel whose one argument is a pack of named values.
+    """A kernel whose one argument is a pack of named values, or a single array.
 
     Taichi spends 10 microseconds per array on each launch. On the CPU this class spends them once.
-    A pack takes over a millisecond to make, so it is reused until Taichi is reset.
+    A pack takes over a millisecond to make, so it is reused until Taichi is reset. A launch with a
+    pack takes 0.3 microseconds longer, so a single value, an array, is passed without one.
 
     `kernel_of` returns the kernel for a pack type. Packs contain NumPy arrays, which kernels change
     in place; arrays of `ti.ndarray`; whole numbers, as i32, or u64 for `np.uint64`; and floats, as
@@ -67,12 +70,14 @@ class Launch:
         """Launch with the values of the last launch, the same objects, without comparing them.
 
         The kernel must compute with whole numbers only, because subnormal numbers are not flushed.
+        Any thread may call this method, because a launch keeps Python's lock.
         """
         running = impl.get_runtime()
         if self._repeats() is running:
-            running.prog.launch_kernel(self._compiled, self._context)
+            _launch_kernel(running.prog, self._compiled, self._context)
         else:
-            self(values)
+            with runtime.alone:
+                self(values)
 
     def without_outputs(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Launch likewise, but return the outputs as they are on the GPU; none on a CPU."""
@@ -115,18 +120,19 @@ class Launch:
         self._renews = for_gpu or any(isinstance(value, ti.Ndarray) for value in values.values())
         if for_gpu:
             values = {**values, _ZERO: 0}
-        kind = _pack_type(tuple((name, *type_of(value)) for name, value in values.items()))
+        kind = _argument_type(tuple((name, *type_of(value)) for name, value in values.items()))
         taichi = impl.get_runtime()
         program, kernel = taichi.prog, self._kernel_of(kind)._primal
-        # `kind(**values)` would make two packs.
-        self._pack = pack = _Pack(kind, dict(values))
-        memory = pack._ArgPack__argpack
-        finalize(pack, _delete, ref(taichi), memory).atexit = False
+        (argument, *others), self._pack = values.values(), dict(values)
+        if others:
+            # `kind(**values)` would make two packs.
+            self._pack = argument = _Pack(kind, self._pack)
+            finalize(argument, _delete, ref(taichi), argument._ArgPack__argpack).atexit = False
         config = program.config()
         try:
-            guards = guarded(0, pack.places[-2]) if for_gpu else nullcontext()
+            guards = guarded(0, argument.places[-2]) if for_gpu else nullcontext()
             with runtime.quiet(), guards:
-                lowered = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
+                lowered = kernel.compiled_kernels[kernel.ensure_compiled(argument)]
                 compiled = program.compile_kernel(config, program.get_device_caps(), lowered)
         except ti.TaichiCompilationError as error:  # only code of plugins causes one
             raise AntsError(
@@ -136,8 +142,8 @@ class Launch:
         self._lowered, self._compiled = lowered, compiled
         self._context = self._new_context()
         # The context needs the arrays as further arguments after the pack.
-        arrays = [name for name, value in values.items() if isinstance(value, _ARRAYS)]
-        self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
+        arrays = (name for name, value in values.items() if isinstance(value, _ARRAYS))
+        self._places = {name: (number,) for number, name in enumerate(arrays, bool(others))}
         self._known = dict.fromkeys(values)
         self._taichi = ref(taichi)
         self._repeats = self._taichi if not self._renews else lambda: None
@@ -145,7 +151,8 @@ class Launch:
     def _new_context(self) -> Any:
         """Return a context for launches with the pack, still without the arrays."""
         context = self._lowered.make_launch_context()
-        context.set_arg_argpack((0,), self._pack._ArgPack__argpack)
+        if isinstance(self._pack, _Pack):
+            context.set_arg_argpack((0,), self._pack._ArgPack__argpack)
         return context
 
     def _set(self, name: str, value: Any) -> None:
@@ -161,7 +168,7 @@ class Launch:
 
 def has_guards(arguments: Any) -> bool:
     """Return whether a kernel with this type of pack is compiled for a GPU."""
-    return _ZERO in arguments.members
+    return _ZERO in getattr(arguments, "members", ())
 
 
 def check_not_lost(values: Iterable[Any]) -> None:
@@ -239,9 +246,9 @@ def type_of(value: Any) -> tuple[str, int]:
 
 
 @cache
-def _pack_type(kinds: tuple[tuple[str, str, int], ...]) -> Any:
+def _argument_type(kinds: tuple[tuple[str, str, int], ...]) -> Any:
     types = {}
     for name, kind, ndim in kinds:
         dtype = getattr(ti, kind)
         types[name] = ti.types.ndarray(dtype=dtype, ndim=ndim) if ndim else dtype
-    return ti.types.argpack(**types)
+    return ti.types.argpack(**types) if len(types) > 1 else types.popitem()[1]

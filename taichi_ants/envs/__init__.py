@@ -14,6 +14,9 @@ register(
     "taichi_ants/HexForage-v0",
     entry_point="taichi_ants.envs.forage:HexForageEnv",
     vector_entry_point="taichi_ants.envs.forage:HexForageVectorEnv",
+    # Without Gymnasium's wrappers: the environment checks the order of calls itself.
+    order_enforce=False,
+    disable_env_checker=True,
 )
 register(
     "taichi_ants/HexColony-v0", vector_entry_point="taichi_ants.envs.colony:HexColonyVectorEnv"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, Literal, get_args
 
 import gymnasium
@@ -36,15 +36,13 @@ DELIVERIES: tuple[str, ...] = get_args(Delivery)
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
 _NUMBERS_OF_ANT = 24  # at least those in `BatchedEnvironments` beside the cells
+_MOST_OUTCOMES = 1 << 12  # a few megabytes
 # The command to an ant after the last step of an episode.
 _AFTER_END = {
     AutoresetMode.SAME_STEP: Command.STEP,
     AutoresetMode.NEXT_STEP: Command.BEGIN,
     AutoresetMode.DISABLED: Command.WAIT,
 }
-# Faster than a view of a row at each step, like the next function.
-_MASKS = list(vector.ACTION_MASKS)
-_int64 = lru_cache(1 << 16)(np.int64)
 # Each row as a number of 8 bytes, because `take` of numbers is three times as fast.
 _PACKED_MASKS = np.pad(vector.ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64)[:, 0]
 
@@ -65,6 +63,7 @@ class LoneAnts(Ants):
         self.batched = BatchedEnvironments(
             self.worlds, task, n, self.max_steps, delivery, task.evaporation_in_training
         )
+        self.outcomes: dict[bytes, tuple[Any, ...]] = {}
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
         seed_of = {i: seed for i, seed in enumerate(seeds) if which[i] and seed is not None}
@@ -75,9 +74,24 @@ class LoneAnts(Ants):
     def advance(self, actions: np.ndarray, waiting: np.ndarray) -> vector.Step:
         begins = waiting if self.mode is AutoresetMode.NEXT_STEP else 0
         self.batched.step(actions, begins, _AFTER_END[self.mode])
+        return self._results()
+
+    def _results(self) -> vector.Step:
         arrays = self.batched.arrays
         results, rewards = arrays["results"], arrays["rewards_of"].astype(np.float64)
         return rewards, results & TERMINATED != 0, results & TRUNCATED != 0
+
+    def outcome(self, results: bytes) -> tuple[Any, ...]:
+        """Return what `step` has to copy and return, after a step with these `results`."""
+        if len(self.outcomes) >= _MOST_OUTCOMES:
+            self.outcomes.clear()
+        info = {name: numbers[0] for name, numbers in self.facts().items()}
+        reward, *over = (numbers.item() for numbers in self._results())
+        seen, mask = self.shown.table[info["state"]], info["action_mask"]
+        return self.outcomes.setdefault(results, (seen, reward, *over, mask, info))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**super().__getstate__(), "outcomes": {}}
 
     def over(self) -> np.ndarray:
         return self.batched.arrays["results"] >= TRUNCATED
@@ -182,8 +196,9 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
             seed = int(self.np_random.integers(2**63))
         self._ants.begin(np.ones(1, bool), [seed])
         self._ants.begun = True
-        observation, *_, info = self._shown(self._ants.batched.alone.tolist())
-        return observation, info
+        results = self._ants.batched.alone.tobytes()
+        seen, *_, mask, info = self._ants.outcomes.get(results) or self._ants.outcome(results)
+        return seen.copy(), {**info, "action_mask": mask.copy()}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Take an action, 0 to 4.
@@ -203,24 +218,12 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         known = type(action) in _WHOLE and 0 <= action < N_ACTIONS
         if not known and not self.action_space.contains(action):  # which takes a microsecond
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
-        return self._shown(batched.step_alone(action))
-
-    def _shown(self, results: list[int]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Return what `step` returns, by the results of `step_alone`."""
-        state, paper_state, result, reason, deliveries, reward = results
-        return (
-            self._ants.shown.rows[state].copy(),
-            float(reward),
-            result & TERMINATED != 0,
-            result & TRUNCATED != 0,
-            {
-                "state": _int64(state),
-                "action_mask": _MASKS[paper_state].copy(),
-                "event": _int64(result & (TRUNCATED - 1)),
-                "reason": _int64(reason),
-                "deliveries": _int64(deliveries),
-            },
-        )
+        results = batched.step_alone(action)
+        outcome = ants.outcomes.get(results) or ants.outcome(results)
+        seen, reward, terminated, truncated, mask, info = outcome
+        info = info.copy()
+        info["action_mask"] = mask.copy()
+        return seen.copy(), reward, terminated, truncated, info
 
     def action_masks(self) -> np.ndarray:
         """Return `info["action_mask"]` as bool (5,), for MaskablePPO of sb3-contrib."""

@@ -17,7 +17,6 @@ from taichi_ants.task.constants import N_ACTIONS
 
 ObservationFormat = Literal["cells", "index", "one_hot"]
 FORMATS: tuple[str, ...] = get_args(ObservationFormat)
-_MOST_VIEWS = 1 << 12
 
 
 class ShownObservations:
@@ -56,11 +55,6 @@ class ShownObservations:
         flat = np.zeros((len(states), ends[-1]), np.float32)
         np.put_along_axis(flat, cells + ends - self.observation.parts, 1.0, axis=1)
         return flat
-
-    @cached_property
-    def rows(self) -> Any:
-        """The rows of `table`; as views, which take less time, unless there are too many."""
-        return list(self.table) if len(self.table) <= _MOST_VIEWS else self.table
 
     def show(self, states: np.ndarray) -> np.ndarray:
         """Return the observations (..., *space.shape) of states, integers of any shape (...)."""

@@ -3,6 +3,7 @@
 import copy
 import pickle
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import gymnasium
@@ -127,6 +128,30 @@ def test_copies_go_on_alike(copied):
                 np.testing.assert_array_equal(one[part], other[part])
 
 
+def test_callers_own_what_an_environment_returns():
+    """Later steps leave it as it is, and changes of it have no effect on later steps."""
+    env, actions = HexForageEnv(), [1, 1, 0, 2, 3, 4] * 3
+    env.reset(seed=0)
+    expected = [str(env.step(action)) for action in actions]
+    for _ in range(2):
+        returned = [(*env.reset(seed=0),), *map(env.step, actions)]
+        assert [str(one) for one in returned[1:]] == expected
+        for seen, *_, info in returned:
+            seen.fill(7)
+            info["action_mask"].fill(7)
+            info.clear()
+
+
+def test_each_thread_steps_its_own_environment():
+    def played(seed: int) -> str:
+        env = HexForageEnv(SMALL[seed % 2], delivery="continues", max_steps=3000)
+        return str([env.reset(seed=seed), *map(env.step, [3, 1, 4, 1, 0, 2, 1] * 400)])
+
+    expected = list(map(played, range(4)))
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(played, range(4))) == expected
+
+
 def test_pictures_show_the_world_as_it_is():
     pictures = HexForageVectorEnv(2, render_mode="rgb_array")
     pictures.reset(seed=0)
@@ -173,10 +198,7 @@ def test_wrong_steps_raise_what_gymnasium_raises():
     [
         ({"world": "nowhere"}, "there is no world 'nowhere'"),
         ({"world": [SMALL[0], worlds.paper()], "num_envs": 2}, "give worlds of one size"),
-        (
-            {"world": SMALL, "num_envs": 2},
-            ", or a list of 1 to 2 of them.",
-        ),
+        ({"world": SMALL, "num_envs": 2}, ", or a list of 1 to 2 of them."),
         ({"task": "maze"}, "task is 'maze'; it must be one of paper, fetching,"),
         ({"delivery": "never"}, "delivery is 'never'"),
         ({"max_steps": 0}, "max_steps is 0"),

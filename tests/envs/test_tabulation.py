@@ -31,10 +31,7 @@ def test_a_function_gets_each_state_as_environments_show_it(observation: str, fo
         (lambda seen: np.zeros((5, 128)), r"shape \(5, 128\) and type float64; .*\(128, 5\)"),
         (lambda seen: np.zeros(128), r"type float64; .* whole numbers and of shape \(128,\)"),
         (lambda seen: np.zeros((128, 5), complex), "type complex128"),
-        (
-            lambda seen: np.full(128, 5),
-            "your function contains 5; all must lie between 0 and 4",
-        ),
+        (lambda seen: np.full(128, 5), "your function contains 5; all must lie between 0 and 4"),
         (lambda seen: np.full(128, -1), "your function contains -1"),
         (lambda seen: np.where(np.eye(128, 5), np.nan, 0), "nan for state 0 and action 0"),
         (lambda seen: np.full((128, 5), -1e300), "-inf for state 0 and action 0"),

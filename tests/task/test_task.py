@@ -119,10 +119,7 @@ REFUSED = [
     (lambda: Traffic(reward_pushed=True), f"task.traffic.reward_pushed` is True{UNLESS}swap`"),
     (lambda: Traffic(carriers_first=True), f"task.traffic.carriers_first` is True{UNLESS}swap`"),
     (lambda: Traffic(swap="yes"), "task.traffic.swap` is 'yes'"),
-    (
-        lambda: Task(traffic="left"),
-        "is 'left'; it must be a Traffic, or one of blocking, r",
-    ),
+    (lambda: Task(traffic="left"), "is 'left'; it must be a Traffic, or one of blocking, r"),
     (lambda: Choice("greedy", temperature=2.0), f"task.choice.temperature` is 2.0{UNLESS}rule`"),
     (lambda: Noise(slip=1.5), "task.noise.slip` is 1.5; it must be between 0 and 1."),
     (lambda: Task(choice=CELLS, homing_cue="trail"), "which ants with food follow already"),
@@ -161,10 +158,7 @@ CELLWISE, SOFTLY, FROZEN = (
 LEARNS = TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0)
 TABLE = np.zeros((128, 5), np.float32)
 COLONIES = [
-    (
-        lambda: paper_colony(CELLWISE, LEARNS),
-        "so ants choose without action values, but sharing",
-    ),
+    (lambda: paper_colony(CELLWISE, LEARNS), "so ants choose without action values, but sharing"),
     (
         lambda: paper_colony(CELLWISE, LEARNS, q_values=TABLE, **FROZEN),
         'set sharing to "frozen" and training to None, and leave out q_values',

@@ -22,7 +22,7 @@ from taichi_ants.worlds.world import World
 # Steps of all ants in a launch of a rollout, which cannot be interrupted; and on a GPU, numbers of
 # their observations, because indices have 32 bits.
 _STEPS_OF_LAUNCH, _NUMBERS_ON_GPU = 1 << 23, 1 << 28
-# The arrays with one int32 per ant, the results of `step_alone` first.
+# The arrays with one int32 per ant, the results of a single ant first.
 _RESULTS = "states", "paper_states", "results", "reasons", "deliveries", "rewards_of"
 _OF_ANTS = (
     *_RESULTS,
@@ -31,8 +31,6 @@ _OF_ANTS = (
     *("steps", "changed", "final_states", "final_paper_states", "final_deliveries"),
 )
 _MOST_NUMBERS = 64  # that a step reads
-_SINGLE = False, 0  # the launch of a step, see `_launch`
-_STEP = int(Command.STEP)
 
 
 class BatchedEnvironments:
@@ -50,7 +48,7 @@ class BatchedEnvironments:
             has one that has not begun. Last states of an episode that a step has restarted:
             final_states, final_paper_states. Deliveries of the episode, and of one that a step has
             restarted: deliveries, final_deliveries.
-        alone: int32 (6,), the results of a single ant as a memoryview, see `step_alone`.
+        alone: A memoryview of all results of a single ant.
     """
 
     def __init__(
@@ -102,7 +100,9 @@ class BatchedEnvironments:
         self.arrays, memory = layout.split(self._joined), self._joined["memory"]
         self.arrays["random_states"] = self.arrays["random_states"].view(np.uint64)
         self.arrays["cells"] = memory[self._numbers["cells_at"] :]
-        self._given = memoryview(memory[self._joined["taken_at"] :][:2])  # "taken", "commands"
+        # "taken" and "commands" of a single ant as one number.
+        self._given = memoryview(memory[self._joined["taken_at"] :][:2].view(np.int64))
+        self._single: Any = None  # the launch of a step
         self.alone = memoryview(memory[self._joined[f"{_RESULTS[0]}_at"] :][: len(_RESULTS)])
         self._arguments = {**self._joined, **self._numbers}
         numbers = {name: one for name, one in self._arguments.items() if isinstance(one, int)}
@@ -132,22 +132,14 @@ class BatchedEnvironments:
         self.arrays["commands"][:] = commands
         self.arrays["after_end"][0] = after_end
         with runtime.alone:
-            self._launch(*_SINGLE).repeat(self._of_steps)
+            self._single = self._launch(False, 0)
+        self._single.repeat(self._of_steps)
 
-    def step_alone(self, action: int) -> list[int]:
-        """Let the only ant, whose episode has begun, act; return its `alone` after the step.
-
-        These are its state and paper state, its result as in `arrays`, its reason, the number of
-        deliveries, and its reward.
-        """
-        self._given[0], self._given[1] = action, _STEP
-        runtime.alone.acquire()  # `with` takes twice as long
-        try:
-            launch = self._launches.get(_SINGLE) or self._launch(*_SINGLE)
-            launch.repeat(self._of_steps)
-        finally:
-            runtime.alone.release()
-        return self.alone.tolist()
+    def step_alone(self, action: int) -> bytes:
+        """Let the only ant, whose episode has begun, act; return its `alone` after the step."""
+        self._given[0] = action  # and the command STEP, which is 0
+        (self._single or self._launch(False, 0)).repeat(self._of_steps)
+        return self.alone.tobytes()
 
     def rollout(
         self,

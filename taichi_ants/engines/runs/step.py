@@ -84,15 +84,16 @@ class Part:
 def parts_of(a: Any, numbers: tuple[str, ...]) -> Named:
     """Return the arguments of a kernel, and the arrays that `layout.join` has joined, by name.
 
-    The first entries of the joined arrays are the arguments of the names `numbers`.
+    These are in `a.memory`, or `a` itself. Their first entries are the arguments `numbers`.
     """
+    memory = getattr(a, "memory", a)
 
     def read(name: str) -> Any:
         if name in numbers:
-            return subscript(None, a.memory, numbers.index(name))
+            return subscript(None, memory, numbers.index(name))
         if hasattr(a, name):
             return getattr(a, name)
-        return Part(a.memory, read(f"{name}_at"))
+        return Part(memory, read(f"{name}_at"))
 
     return Named(read)
 

@@ -11,15 +11,7 @@ from random_colonies import random_task
 from random_rewards import random_rewards
 from random_worlds import random_world
 
-from taichi_ants import (
-    TrainingConfig,
-    evaluate,
-    learners,
-    rollout,
-    runtime,
-    trace_training,
-    train,
-)
+from taichi_ants import TrainingConfig, evaluate, learners, rollout, runtime, trace_training, train
 from taichi_ants.engines.runs import engine, kernels
 from taichi_ants.settings import declared
 from taichi_ants.task import Task, observations

@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from taichi_ants import (
-    TrainingConfig,
-    continue_training,
-    evaluate,
-    rollout,
-    trace_training,
-    train,
-)
+from taichi_ants import TrainingConfig, continue_training, evaluate, rollout, trace_training, train
 from taichi_ants.engines.runs.engine import pieces, size_of_launch
 from taichi_ants.worlds import paper
 
