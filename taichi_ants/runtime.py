@@ -9,6 +9,7 @@ import ast
 import contextlib
 import ctypes
 import gc
+import inspect
 import io
 import math
 import os
@@ -43,6 +44,10 @@ if platform.machine() == "x86_64" and platform.libc_ver()[0] == "glibc":
 # Whether kernels for a CPU are compiled and launched as those for a GPU, with the same results, so
 # that tests can compare the two on machines without one.
 gpu_kernels_on_cpu = False
+
+# Taichi asks for the source of the importer of each function; without an entry, `inspect` would
+# look through all modules each time.
+inspect.modulesbyfile["<frozen importlib._bootstrap>"] = ""
 
 # A lock for environments in several threads, because Taichi compiles and launches for one thread.
 alone = threading.RLock()
