@@ -315,8 +315,9 @@ def tables(plan: Plan, runs: Runs) -> str:
             save_policy(folder / "policies" / name, q_values[run], metadata, point.task.observation)
     parts: dict[str, Any] = {"drawings": [], "players": []}
     if runs.figures:
-        style.save_all(draw_all(rows), folder / "figures")
-        parts["drawings"] = drawings(draw_all(rows))
+        figures = draw_all(rows)
+        style.save_all(figures, folder / "figures")
+        parts["drawings"] = drawings(figures)
         parts["players"] = at_work(conditions, policies, seeds[0])
     facts = page.setting_facts(settings_of(runs.study.points, seeds))
     parts["facts"] = {**facts, **page.made_facts(runs.made)}

@@ -17,7 +17,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     import gc
 
-    gc.set_threshold(300_000)  # with Python's default, collections take a tenth of the time
+    gc.set_threshold(1_000_000)  # with Python's default, collections take a tenth of the time
     from collections.abc import Mapping, Sequence
     from dataclasses import dataclass, fields, replace
     from functools import partial
@@ -235,9 +235,9 @@ def tables(plan: Plan, results: Results) -> str:
     comparison = replace(comparison, curves=figures.curves_of(comparison, arrays))
     follow, runs = partial(evaluate, arch=arch), (study.seeds, first.rollouts, first.max_steps)
     baselines = plan.exact() + bounds.policy_rows(first.world, first.task, follow, *runs)
-    saved = process.begin(figures.save_all, comparison, baselines, folder / "figures")
+    drawn = process.begin(figures.save_all, comparison, baselines, folder / "figures")
     chosen = [trained(study, row, run, arch) for row, run in examples(comparison)]
-    seen = page.begin(comparison, baselines, chosen, saved) if results.figures else Seen
+    seen = page.begin(comparison, chosen, drawn) if results.figures else Seen
 
     summaries = summarise(comparison)
     lines, audit = table2(comparison, summaries), assess(comparison)

@@ -116,5 +116,8 @@ def save_all(figures: Mapping[str, Figure], folder: str | Path) -> None:
 def save(figure: Figure, path: Path) -> None:
     """Write a figure as a PNG file; raise AntsError if that fails."""
     how: dict[str, Any] = {"format": "png", "dpi": DPI, "facecolor": "white"}
+    places = [axis.get_position(original=True) for axis in figure.axes]
     with styled():
         write_atomically(path, lambda file: figure.savefig(file, **how))
+    for axis, place in zip(figure.axes, places, strict=True):  # as new for the next layout
+        axis.set(position=place, in_layout=True)
