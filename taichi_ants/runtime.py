@@ -32,6 +32,7 @@ ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
 _LONGEST_LOCK = 60.0  # seconds
 _trees: dict[str, Any] = {}  # syntax trees of functions in kernels, by source
+inspect.modulesbyfile["<frozen importlib._bootstrap>"] = ""  # or Taichi's decorators search for it
 
 _Modes = ctypes.c_uint32 * 4  # C's `femode_t`; the second number is MXCSR
 _FLUSH_TO_ZERO = 1 << 15
@@ -44,10 +45,6 @@ if platform.machine() == "x86_64" and platform.libc_ver()[0] == "glibc":
 # Whether kernels for a CPU are compiled and launched as those for a GPU, with the same results, so
 # that tests can compare the two on machines without one.
 gpu_kernels_on_cpu = False
-
-# Taichi asks for the source of the importer of each function; without an entry, `inspect` would
-# look through all modules each time.
-inspect.modulesbyfile["<frozen importlib._bootstrap>"] = ""
 
 # A lock for environments in several threads, because Taichi compiles and launches for one thread.
 alone = threading.RLock()

@@ -165,6 +165,4 @@ def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str,
 
 def save_all(comparison: Comparison, baselines: Sequence[Baseline], folder: Path) -> list[Drawing]:
     """Write all figures as files, and return them for the page."""
-    figures = draw_all(comparison, baselines)
-    style.save_all(figures, folder)
-    return drawings(figures)
+    return drawings(draw_all(comparison, baselines), folder)
