@@ -253,21 +253,22 @@ def tables(plan: Plan, results: Results) -> str:
     curves = {f"curve_{name}": curve for name, curve in comparison.curves.items()}
     archives.write(folder / "runs.npz", {**of_runs, **curves})
     save_policies(folder / "policies", comparison, chosen)
-    shown = seen()
     facts = {"World": comparison.world, **setting_facts(settings_of(study.points, study.seeds))}
-    links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
     facts |= made_facts(results.made)
-    titles = "return", "steps", "late_steps"
-    for name, one in {
+    titles, told = ("return", "steps", "late_steps"), report(comparison, lines, audit)
+    to_publish: dict[str, Any] = {
         **dict(zip(titles, figure_tables(lines, comparison), strict=False)),
         "policies": behaviour_table(lines, summarise_behaviours(comparison)),
         "claims": headlines(audit, ON_PAGE),
         "verdicts": verdict_table(audit),
-    }.items():
+    }
+    shown = seen()  # after all else, as the second process has most to do
+    links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
+    for name, one in to_publish.items():
         published.write(folder / "tables" / f"paper_{name}.json", [one])
     html = page.comparison_page(comparison, baselines, lines, audit, shown, facts, links)
     files.write_text(folder / PAGE, html)
-    return report(comparison, lines, audit)
+    return told
 
 
 def trained(study: Study, row: int, run: int, arch: str) -> Example:
