@@ -34,7 +34,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from colony_limits import limits_of
 
     from taichi_ants import AntsError, Colony, TrainingConfig, commands, files, learners, worlds
-    from taichi_ants.analysis import style
     from taichi_ants.analysis.drawings import drawings
     from taichi_ants.analysis.tables import plain_text, sentence
     from taichi_ants.errors import count
@@ -315,8 +314,7 @@ def tables(plan: Plan, runs: Runs) -> str:
             save_policy(folder / "policies" / name, q_values[run], metadata, point.task.observation)
     parts: dict[str, Any] = {"drawings": [], "players": []}
     if runs.figures:
-        style.save_all(draw_all(rows), folder / "figures")
-        parts["drawings"] = drawings(draw_all(rows))
+        parts["drawings"] = drawings(draw_all(rows), folder / "figures")
         parts["players"] = at_work(conditions, policies, seeds[0])
     facts = page.setting_facts(settings_of(runs.study.points, seeds))
     parts["facts"] = {**facts, **page.made_facts(runs.made)}

@@ -7,6 +7,7 @@ import ast
 import contextlib
 import ctypes
 import gc
+import inspect
 import io
 import math
 import os
@@ -29,6 +30,7 @@ ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
 _LONGEST_LOCK = 60.0  # seconds
 _trees: dict[str, Any] = {}  # syntax trees of functions in kernels, by source
+inspect.modulesbyfile["<frozen importlib._bootstrap>"] = ""  # or Taichi's decorators search for it
 
 _Modes = ctypes.c_uint32 * 4  # C's `femode_t`; the second number is MXCSR
 _FLUSH_TO_ZERO = 1 << 15

@@ -163,11 +163,6 @@ def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str,
     }
 
 
-def save_all(comparison: Comparison, baselines: Sequence[Baseline], folder: Path) -> None:
-    """Write all figures as files."""
-    style.save_all(draw_all(comparison, baselines), folder)
-
-
-def for_page(comparison: Comparison, baselines: Sequence[Baseline]) -> list[Drawing]:
-    """Return all figures for the page, drawn anew, because saving changes their layout."""
-    return drawings(draw_all(comparison, baselines))
+def save_all(comparison: Comparison, baselines: Sequence[Baseline], folder: Path) -> list[Drawing]:
+    """Write all figures as files, and return them for the page."""
+    return drawings(draw_all(comparison, baselines), folder)

@@ -11,7 +11,7 @@ import numpy as np
 from policy_sheet import policy_sheet
 
 from paper import comparison as paper
-from paper import figures, process, report
+from paper import process, report
 from paper.baselines import Baseline
 from paper.claims import Audit, headlines
 from paper.comparison import DEFINITIONS, Comparison, counts
@@ -60,6 +60,9 @@ def as_in_training(task: Task) -> Task:
 
 def get_ready(world: World, task: Task) -> None:
     """Import what draws figures and prepare the kernels of recordings, while others train."""
+    from matplotlib import artist
+
+    vars(artist)["kwdoc"] = lambda _: ""  # for help texts, which take a third of the import
     style.new_figure(1)
     table = np.zeros((task.n_states, N_ACTIONS), np.float32)
     arguments = RolloutArguments(world, as_in_training(task), 0, 1, 0, table)
@@ -67,14 +70,14 @@ def get_ready(world: World, task: Task) -> None:
 
 
 def begin(
-    comparison: Comparison, baselines: list[Baseline], examples: list[Example], saved: process.Begun
+    comparison: Comparison, examples: list[Example], drawn: process.Begun
 ) -> Callable[[], Seen]:
-    """Return a function that waits until figures are `saved`, and for all that the page shows.
+    """Return a function that waits until figures are `drawn`, and for all that the page shows.
 
     This process follows the policies, because it has compiled the kernel.
     """
     first = {int(comparison.behaviours[one[:2]]): one for one in reversed(examples)}
-    calls: dict[Any, process.Begun] = {"saved": saved}
+    calls: dict[Any, process.Begun] = {"figures": drawn}
     done, captions = counts(comparison.behaviours), dict[int, tuple[str, str]]()
     sheet = None
     for code, (row, _, point, seed, q_values) in sorted(first.items()):
@@ -93,7 +96,6 @@ def begin(
         if code == DELIVERS:
             image = policy_sheet(q_values, f"{variant.label}: policy", task=point.task)
             sheet = Picture.of(f"The policy of an ant: {whose}", image)
-    calls["figures"] = process.begin(figures.for_page, comparison, baselines)
 
     def wait() -> Seen:
         with progress_bar("pictures") as progress:

@@ -27,29 +27,22 @@ def second(wanted: bool) -> Iterator[None]:
 def begin(call: Callable[..., Any], *given: Any, **named: Any) -> Begun:
     """Return a function that waits for the result of a call, which the second process runs.
 
-    The call runs here, when the function is called, if the second process has not begun it, or if
-    there is none. The called function must be at the top level of a module of this folder or of the
-    package.
+    If there is none, the call runs here, when the function is called. The called function must be
+    at the top level of a module of this folder or of the package.
     """
     here = partial(call, *given, **named)
-    if _process is None:
-        return here
-    future = _process.submit(here)
-    return lambda: here() if future.cancel() else future.result()
+    return here if _process is None else _process.submit(here).result
 
 
 def results_of(calls: dict[Any, Begun], progress: Callable[[float], None]) -> dict[Any, Any]:
-    """Return the results of calls that have begun; raises an error of one after all have ended.
-
-    The last ones come first, because the second process has not begun them.
-    """
+    """Return the results of calls that have begun; raises the first error after all have ended."""
     results, errors = dict[Any, Any](), list[Exception]()
-    for name, call in reversed(calls.items()):
+    for name, call in calls.items():
         progress((len(results) + len(errors)) / len(calls))
         try:
             results[name] = call()
         except Exception as error:
             errors.append(error)
     if errors:
-        raise errors[-1]
+        raise errors[0]
     return results

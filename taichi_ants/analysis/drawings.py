@@ -6,11 +6,12 @@ import html
 import io
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.style import BLUE, GREY, INK, ORANGE, PALE, RED, SKY, WINE, styled
+from taichi_ants.analysis.style import BLUE, GREY, INK, ORANGE, PALE, RED, SKY, WINE, save, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,8 +57,11 @@ def drawing(name: str, figure: Figure) -> Drawing:
     return Drawing(name, title, " ".join(caption.split()), _for_page(text.getvalue(), title))
 
 
-def drawings(figures: Mapping[str, Figure]) -> list[Drawing]:
-    """Return all figures as markup."""
+def drawings(figures: Mapping[str, Figure], folder: Path | None = None) -> list[Drawing]:
+    """Return all figures as markup, after writing them as PNG files into the folder, if any."""
+    if folder is not None:
+        for name, figure in figures.items():
+            save(figure, folder / f"{name}.png")
     return [drawing(name, figure) for name, figure in figures.items()]
 
 
@@ -75,8 +79,7 @@ def _thin(axis: Axes) -> None:
 def _for_page(svg: str, title: str) -> str:
     """Return the element of an SVG file with rounded numbers and the styles of the page."""
     svg = svg[svg.index("<svg") :].strip().replace("xlink:href", "href")
-    svg = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", svg, flags=re.S)
-    svg = re.sub(r' font-family: [^;"]*;', "", svg)
+    svg = re.sub(r'(?s)<metadata>.*?</metadata>|<style.*?</style>| font-family: [^;"]*;', "", svg)
     svg = re.sub(r'<g id="[^"]*">', "<g>", svg)
     # Coordinates and paths in tenths of a point.
     svg = re.sub(
@@ -88,9 +91,8 @@ def _for_page(svg: str, title: str) -> str:
     svg = re.sub(r"\s*\n\s*", "\n", svg)
     for colour, name in COLOURS.items():
         svg = re.sub(re.escape(colour), f"var(--{name})", svg, flags=re.I)
-    box = re.search(r'viewBox="([^"]*)"', svg)
-    assert box is not None
-    head = f'<svg viewBox="{box[1]}" role="img" aria-label="{html.escape(title)}"'
+    box = re.findall(r'viewBox="([^"]*)"', svg)[0]
+    head = f'<svg viewBox="{box}" role="img" aria-label="{html.escape(title)}"'
     return re.sub(r"<svg[^>]*", lambda _: head, svg, count=1)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -107,14 +107,10 @@ def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
     return entries
 
 
-def save_all(figures: Mapping[str, Figure], folder: str | Path) -> None:
-    """Write figures as PNG files into a folder; AntsError if a file cannot be written."""
-    for name, figure in figures.items():
-        save(figure, Path(folder, f"{name}.png"))
-
-
 def save(figure: Figure, path: Path) -> None:
     """Write a figure as a PNG file; raise AntsError if that fails."""
-    how: dict[str, Any] = {"format": "png", "dpi": DPI, "facecolor": "white"}
+    places = [axis.get_position(original=True) for axis in figure.axes]
     with styled():
-        write_atomically(path, lambda file: figure.savefig(file, **how))
+        write_atomically(path, partial(figure.savefig, format="png", dpi=DPI, facecolor="white"))
+    for axis, place in zip(figure.axes, places, strict=True):  # as new for the next layout
+        axis.set(position=place, in_layout=True)

@@ -72,7 +72,7 @@ class Picture(NamedTuple):
     @classmethod
     def of(cls, words: str, image: np.ndarray) -> Picture:
         """Return the picture of an image, uint8 (height, width, 3)."""
-        return cls(words, image.shape, base64.b64encode(png(image, optimize=True)).decode())
+        return cls(words, image.shape, base64.b64encode(png(image)).decode())
 
 
 class ShownFinding(NamedTuple):

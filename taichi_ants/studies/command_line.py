@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import atexit
+import gc
 import os
 import re
 import sys
@@ -218,6 +220,7 @@ def reporting(interrupted: str = "Stopped.") -> Iterator[None]:
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
     os.environ["MPLBACKEND"] = "agg"  # figures are files, and the user's backend may be missing
+    atexit.register(gc.freeze)  # so that Python ends without collections, which take 0.2 s
     status = 0
     try:
         with stoppable(interrupted):

@@ -218,6 +218,7 @@ def provenance(arguments: Sequence[str]) -> dict[str, Any]:
     }
 
 
+@cache
 def source() -> dict[str, Any]:
     """Return the `commit` of this package's source, and whether it was `clean`.
 

@@ -53,8 +53,7 @@ def play(folder: Path, number: int, threads: int | None) -> None:
                 f"{count(len(differ), 'array')} of this run, such as {differ[0]}, differ from "
                 "those in the store; use the version that computed it."
             )
-        title = f"Row {number} of {folder.name}"
-        recording = _recorded(point, seed, again, learned, title, where)
+        recording = _recorded(point, seed, again, learned, f"Row {number} of {folder.name}", where)
     path = folder / f"row-{number}.html"
     save_page(path, recording)
     print(f"seed {seed}")

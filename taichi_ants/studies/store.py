@@ -77,11 +77,8 @@ class Store:
         """
         rows = {key: n for n, key in enumerate(points)}
         columns = {seed: n for n, seed in enumerate(seeds)}
-        blocks = [
-            block
-            for block in self._blocks.values()
-            if all(parts_of(name, block.arrays) for name in arrays)
-        ]
+        every = self._blocks.values()
+        blocks = [b for b in every if all(parts_of(name, b.arrays) for name in arrays)]
         numbers = np.full((len(points), len(seeds)), -1)
         for number, block in enumerate(blocks):
             p = [rows[key] for key in block.points if key in rows]
