@@ -1,11 +1,9 @@
 """The kernel of independent runs: whole episodes, several runs at a time in each parallel task.
 
-The data of a run (cells, Q table, memory) are small enough for the processor's first cache.
-
-A task has a lane for each of its runs, and does each part of a step for all lanes in a loop. Loops
-without branches become vector instructions, with which a step of Q-learning takes two thirds of the
-time on an Intel Xeon. Parts that have branches, or that write where other runs could read, are in
-separate loops. When no run is left for a lane, its ant goes on, but nothing is written.
+The data of a run (cells, Q table, memory) are small enough for the processor's first cache. A task
+has a lane for each of its runs, and does each part of a step for all lanes in a loop. Loops without
+branches become vector instructions. Parts that have branches, or that write where other runs could
+read, are in separate loops. When no run is left for a lane, its ant goes on, but writes nothing.
 """
 
 from collections.abc import Callable
@@ -34,9 +32,9 @@ from taichi_ants.learners.memory import (
     values_of,
 )
 from taichi_ants.task.constants import N_ACTIONS, ROW, Event
+from taichi_ants.task.rules import policy
 from taichi_ants.task.rules.actions import bit_number_in, step_end
 from taichi_ants.task.rules.pheromone import FADING, NONE
-from taichi_ants.task.rules.policy import BY_VALUES, best_actions, chance_of, choose
 
 LANES = 16  # of a task on a CPU, if there are as many runs
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
@@ -89,7 +87,7 @@ def run_kernel(
     # A single lane has branches, which are faster where a learned policy repeats actions.
     alone, deposit = n_lanes == 1, rules.deposit
     observe, executes = step.observe_function(rules, alone), hooks_at(rules.features)["execute"]
-    draw, chance_of_draw = BY_VALUES.get(rules.choice, (None, None))
+    draw, chance_of_draw = policy.BY_VALUES.get(rules.choice, (None, None))
     by_one = alone or draw is not None  # whether ants choose one after the other
     # Whether an episode in which no random number mattered is equal to all others of the run.
     repeats = not (learns or draw is not None or executes or hooks_at(rules.features)["see"])
@@ -117,8 +115,8 @@ def run_kernel(
         lanes.event[k], lanes.random_state[k] = ant.event, ant.random_state
 
     @ti.func
-    def decide(a: ti.template(), lanes: ti.template(), k, state):
-        """Return the next action in lane k, the stream after the draw, and its probability."""
+    def decide(a: ti.template(), lanes: ti.template(), k, state, once: ti.template()):
+        """Draw and return the next action in lane k, and store its probability."""
         rng, explore_below = advance(lanes.random_state[k]), lanes.explore_below[k]
         values = values_of(a.q, lanes.table[k], state)
         action, chance = 0, ti.f64(0.0)
@@ -128,13 +126,18 @@ def run_kernel(
             if ti.static(traced):
                 chance = chance_of_draw(ant_view(a, ant), values, action, explore_below)
         else:
-            action = choose(values, bits_of(rng), explore_below)
+            if ti.static(once):  # in an episode: code that compiles faster
+                best = policy.best_actions(values)
+                action = policy.choose_in_crowd(a.compass, best, bits_of(rng), explore_below)
+            else:
+                action = policy.choose(values, bits_of(rng), explore_below)
             if ti.static(repeats):
                 if lanes.drawn[k] == 0:
-                    lanes.drawn[k] = ti.cast(popcnt(best_actions(values)) > 1, ti.i32)
+                    lanes.drawn[k] = ti.cast(popcnt(policy.best_actions(values)) > 1, ti.i32)
             if ti.static(traced):
-                chance = chance_of(values, action, explore_below)
-        return action, rng, chance
+                chance = policy.chance_of(values, action, explore_below)
+        lanes.random_state[k], lanes.chance[k] = rng, chance
+        return action
 
     @ti.func
     def decide_all(
@@ -153,7 +156,7 @@ def run_kernel(
                 rng = ti.select(lanes.terminated[k] == 1, lanes.random_state[k], rng)
             lanes.random_state[k] = rng
         for k in range(n_lanes):
-            best = best_actions(values_of(a.q, lanes.table[k], states[k]))
+            best = policy.best_actions(values_of(a.q, lanes.table[k], states[k]))
             lanes.choices[k] = ti.select(lanes.explores[k] == 1, (1 << N_ACTIONS) - 1, best)
             lanes.n_choices[k] = popcnt(lanes.choices[k])
             if ti.static(repeats):
@@ -177,7 +180,8 @@ def run_kernel(
             lanes.floats[k] = run * a.floats_by_8 * 8 & _PLACES
             lanes.integers[k] = run * a.integers_by_8 * 8 & _PLACES
             lanes.discount[k] = ti.cast(a.settings[run * columns + layout.DISCOUNT], ti.f32)
-            step.restore(a, base, 0, 0, a.size - 1)
+            lanes.first[k], lanes.last[k] = 0, a.size - 1
+        step.restore(a, base, 0, lanes.first[k], lanes.last[k])
         if ti.static(not learns):
             lanes.random_state[k] = a.streams[run * a.n_episodes + lanes.episode[k]]
         if ti.static(begins):
@@ -194,9 +198,7 @@ def run_kernel(
         lanes.paper_state[k], lanes.state[k], ant.random_state = observe(a, base, ant, 0)
         keep(lanes, k, ant)
         if ti.static(on_policy):
-            lanes.action[k], lanes.random_state[k], lanes.chance[k] = decide(
-                a, lanes, k, lanes.state[k]
-            )
+            lanes.action[k] = decide(a, lanes, k, lanes.state[k], True)
 
     @ti.func
     def at_of(lanes: ti.template(), k):
@@ -245,9 +247,7 @@ def run_kernel(
             decide_all(a, lanes, lanes.state, lanes.action)
         for k in range(n_lanes):
             if ti.static(not on_policy and by_one):
-                lanes.action[k], lanes.random_state[k], lanes.chance[k] = decide(
-                    a, lanes, k, lanes.state[k]
-                )
+                lanes.action[k] = decide(a, lanes, k, lanes.state[k], False)
             ant, executed = ant_of(lanes, k), lanes.action[k]
             for execute in ti.static(executes):
                 executed, ant.random_state = execute(ant_view(a, ant), executed, ant.random_state)
@@ -296,9 +296,7 @@ def run_kernel(
         for k in range(n_lanes):
             if ti.static(on_policy and by_one):
                 if lanes.terminated[k] == 0:
-                    lanes.next_action[k], lanes.random_state[k], lanes.chance[k] = decide(
-                        a, lanes, k, lanes.next_state[k]
-                    )
+                    lanes.next_action[k] = decide(a, lanes, k, lanes.next_state[k], False)
             if ti.static(at_once):
                 rates = rates_of(a, lanes, k)
                 lanes.entry[k], value, lanes.error[k] = error_of(
@@ -358,8 +356,8 @@ def run_kernel(
         a.outcomes[layout.DELIVERIES, run, episode] = ti.cast(
             lanes.event[k] == Event.DELIVERED, ti.i32
         )
-        first = ti.min(lanes.first[k], a.cells[base + a.size])
-        step.restore(a, base, 0, first, ti.max(lanes.last[k], a.cells[base + a.size + 1]))
+        lanes.first[k] = ti.min(lanes.first[k], a.cells[base + a.size])
+        lanes.last[k] = ti.max(lanes.last[k], a.cells[base + a.size + 1])
         settings = run * columns
         a.epsilon[run] = ti.max(
             a.settings[settings + layout.MIN_EPSILON],

@@ -37,11 +37,7 @@ def step_around(compass: ti.template(), heading, turns: ti.template()):
 
 @ti.func
 def turn(compass: ti.template(), heading, move):
-    """Return the heading after a move (LEFT, FORWARD or RIGHT).
-
-    With a branch, the processor can continue with a predicted action, because learned policies
-    repeat actions. Arithmetic would have to wait for the comparison of the action values.
-    """
+    """Return the heading after a move, by branches for the reason in `policy.choose`."""
     turned = heading
     if move == LEFT:
         turned = turned_by(compass, heading, LEFT)

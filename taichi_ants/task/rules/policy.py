@@ -11,7 +11,7 @@ from taichi.math import popcnt
 
 from taichi_ants.arithmetic.numbers import exponential, power
 from taichi_ants.arithmetic.random_bits import below, high_word, low_word
-from taichi_ants.task.constants import GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT, SEES_GOAL
+from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT, SEES_GOAL
 from taichi_ants.task.rules.actions import bit_number_in
 
 
@@ -64,29 +64,29 @@ def best_actions(values):
 
 @ti.func
 def choose(values, bits, explore_below):
-    """Return an epsilon-greedy action from one draw of 64 bits, with ties broken at random.
+    """Return an epsilon-greedy action from one draw; `explore_below` is epsilon * 2**32, u64.
 
-    If the upper word is below `explore_below` (epsilon * 2**32 as u64), the action is random. The
-    lower word selects a random action, or breaks ties, so that every decision takes one draw.
+    Each move that can be the best one has its own branch, here and in `choose_from_masks`: the
+    processor goes on with the action that it predicts, and finds out early if that is wrong.
     """
-    action = 0
-    if high_word(bits) < explore_below:
-        action = below(low_word(bits), N_ACTIONS)
-    else:
-        mask = best_actions(values)
-        if mask & (mask - 1) == 0:  # one best action: usual, so the branch is well predicted
-            action = lowest_bit_number(mask)
+    action = below(low_word(bits), N_ACTIONS)
+    if high_word(bits) >= explore_below:
+        others = larger(values[PICK_UP], values[GIVE])
+        if values[FORWARD] > larger(larger(values[LEFT], values[RIGHT]), others):
+            action = FORWARD
+        elif values[LEFT] > larger(larger(values[FORWARD], values[RIGHT]), others):
+            action = LEFT
+        elif values[RIGHT] > larger(larger(values[LEFT], values[FORWARD]), others):
+            action = RIGHT
         else:
+            mask = best_actions(values)
             action = bit_number(mask, below(low_word(bits), popcnt(mask)))
     return action
 
 
 @ti.func
 def choose_in_crowd(compass: ti.template(), best, bits, explore_below):
-    """Return the action of `choose`, without a branch: exploration in crowds is unpredictable.
-
-    `best` are the `best_actions` of the state.
-    """
+    """Return the action of `choose` without a branch, for crowds; `best` are the `best_actions`."""
     mask = ti.select(high_word(bits) < explore_below, (1 << N_ACTIONS) - 1, best)
     return bit_number_in(compass, mask, below(low_word(bits), popcnt(mask)))
 
@@ -94,13 +94,15 @@ def choose_in_crowd(compass: ti.template(), best, bits, explore_below):
 @ti.func
 def choose_from_masks(compass: ti.template(), best: ti.template(), state, bits, explore_below):
     """Return the action of `choose`; `best` has the best actions of each state, as bits."""
-    action = 0
-    if high_word(bits) < explore_below:
-        action = below(low_word(bits), N_ACTIONS)
-    else:
+    action = below(low_word(bits), N_ACTIONS)
+    if high_word(bits) >= explore_below:
         mask = ti.cast(best[state], ti.i32)
-        if mask & (mask - 1) == 0:
-            action = lowest_bit_number(mask)
+        if mask == 1 << FORWARD:
+            action = FORWARD
+        elif mask == 1 << LEFT:
+            action = LEFT
+        elif mask == 1 << RIGHT:
+            action = RIGHT
         else:
             action = bit_number_in(compass, mask, below(low_word(bits), popcnt(mask)))
     return action
