@@ -141,6 +141,7 @@ FOR_CUDA = """
 import os
 import drawing, numpy as np, taichi as ti
 from taichi_ants import Colony, learners, runtime, train, worlds
+from taichi_ants.engines.colony import stepping
 from taichi_ants.envs.forage import HexForageVectorEnv
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
@@ -179,9 +180,10 @@ call(kernels.replay, f32, i32, i32, i32, i32, i32, np.zeros(9, np.uint8), 1, 0.1
 call(kernels.iterate, f64, f64, f64, 0, i32, i32, f64, i32, i32, f64, 1, 0.9, 0.0, 0.1)
 for group in ("castes_fields", "labour_soft", "own_deposit"):
     for _, drawn in drawing.colonies_of(group, 1):
-        colony = Colony(*drawn.model, **drawn.options)
-        colony.begin_episode()
-        colony.tick()
+        for stepping._MOST_IN_ONE_LOOP in (10**9, 0):
+            colony = Colony(*drawn.model, **drawn.options)
+            colony.begin_episode()
+            colony.tick()
 assert colony.schedule == "by_ant"
 """
 

@@ -19,6 +19,7 @@ DOES_NOTHING(cuWaitExternalSemaphoresAsync)
 GIVES(cuCtxCreate_v2) GIVES(cuCtxGetCurrent) GIVES(cuDevicePrimaryCtxRetain) GIVES(cuEventCreate)
 GIVES(cuDeviceGetDefaultMemPool) GIVES(cuModuleGetFunction) GIVES(cuStreamCreate)
 
+int cuCtxGetDevice(int *device) { *device = 0; return 0; }
 int cuDeviceGet(int *device, int number) { *device = number; return 0; }
 int cuDeviceGetCount(int *n) { *n = 1; return 0; }
 int cuDeviceGetName(char *name, int size, int device) { strncpy(name, "none", size); return 0; }

@@ -11,6 +11,7 @@ import record
 from interrupts import interrupted_after_launch
 
 from taichi_ants import AntsError, Colony, TrainingConfig, runtime, task, worlds
+from taichi_ants.engines import device_memory
 from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.layout import BY_ANT, schedule_of
 
@@ -68,6 +69,24 @@ def test_threads_add_to_the_same_sums_in_any_order(ants, ants_of_place, monkeypa
     colony, expected = made(ants=ants), made("by_world", ants)
     for one in (colony, expected):
         one.tick(40)
+    assert_same(colony, expected)
+
+
+@pytest.mark.parametrize("learner", [DYNA_Q, SARSA])
+def test_blocks_of_threads_wait_for_each_other(learner, monkeypatch):
+    """Two threads of a CPU are two blocks, of one thread each."""
+    import taichi as ti
+
+    from taichi_ants.engines.colony import kernels
+
+    runtime.start(2)
+    monkeypatch.setattr(device_memory, "multiprocessors", lambda: 2)
+    monkeypatch.setattr(kernels, "THREADS_OF_BLOCK", 1)
+    monkeypatch.setattr(ti.simt.block, "sync", lambda: None)  # for a GPU only
+    colony, expected = made(ants=60, learner=learner), made("by_world", 60, learner)
+    for one in (colony, expected):
+        one.tick(300)
+    assert colony.arrays["barrier"][layout.Barrier.ARRIVED] > 2
     assert_same(colony, expected)
 
 
