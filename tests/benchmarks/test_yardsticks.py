@@ -1,5 +1,7 @@
 """The yardsticks in C of training and of colonies: more writings of the rules, equal to the bit."""
 
+from itertools import product
+
 import colony_in_c
 import numpy as np
 import pytest
@@ -45,9 +47,9 @@ def test_c_gives_the_same_runs(learner, delivery, name, yardsticks):
         seeds = (0, 7, 2**63 + 5)
         result = train(world, configs, seeds, 25, 150, Task(delivery=delivery))
         deliveries += result.deliveries.sum()
-        for threads in (1, 2):
+        for threads, yardstick in product((1, 2), yardsticks[name]):
             given = (delivery == "truncates", 25, 150, threads)
-            trained = throughput.train_in_c(yardsticks[name], world, configs, seeds, *given)
+            trained = throughput.train_in_c(yardstick, world, configs, seeds, *given)
             throughput.check_same(trained, result)
     assert deliveries > 100
 
