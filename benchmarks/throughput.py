@@ -150,13 +150,12 @@ def compiler_note(command: str, threads: int) -> str:
 
 def load_yardsticks(command: str, folder: str | Path, threads: int) -> dict[str, list[Yardstick]]:
     """Return functions in C by name, compiled in a folder; vector C requires AVX-512."""
-    loaded = compile_c(command, SOURCES, Path(folder) / "ant.so", threads)
-    alone = compile_c(command, SOURCES[:1], Path(folder) / "alone.so", threads, "-DTOGETHER=1")
-    return {
-        name: [getattr(one, f) for one in (loaded, alone) if hasattr(one, f)]
-        for f, name in YARDSTICKS.items()
-        if hasattr(loaded, f)
-    }
+    loaded = [
+        compile_c(command, sources, Path(folder) / f"{runs}.so", threads, f"-DTOGETHER={runs}")
+        for runs, sources in ((1, SOURCES[:1]), (4, SOURCES))
+    ]
+    found = {n: [getattr(c, f) for c in loaded if hasattr(c, f)] for f, n in YARDSTICKS.items()}
+    return {name: functions for name, functions in found.items() if functions}
 
 
 def clock(threads: int) -> float:

@@ -1,12 +1,12 @@
 /* Ants that learn, in C without vector instructions, for comparison in throughput.py.
  *
- * For the rules, see ant.h. The program takes four runs together: all of them act, and then all of
- * them learn. A step is a chain of operations, each of which needs the result of the one before.
- * With four chains, the processor has something to do while one of them waits. There are hardly any
- * branches, since nothing could predict which action an ant takes: a table has the effect of each
- * action in each state, and masks select between values. Some processors are faster with TOGETHER
- * defined as 1: one run, whose usual actions have branches, which they predict. Each state stores its largest action value
- * and the actions that have it, except with Dyna-Q, which updates many more values than ants read.
+ * For the rules, see ant.h. The program takes TOGETHER runs at once, 4 or 1: all of them act, and
+ * then all of them learn. A step is a chain of operations, each of which needs the result of the one
+ * before. With four chains, the processor has something to do while one of them waits. There are
+ * hardly any branches, since nothing could predict which actions four ants take: a table has the
+ * effect of each action in each state, and masks select between values. Each state stores its
+ * largest action value and the actions that have it, except with Dyna-Q, which updates many more
+ * values than ants read.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -16,9 +16,6 @@
 #include <wasm_simd128.h>
 #endif
 
-#ifndef TOGETHER
-#define TOGETHER 4
-#endif
 enum { N_PAIRS = N_STATES * N_ACTIONS, ROW = 8 };
 /* A cell has its level + 1 above four bits if it is empty, else its ground in these bits. */
 enum { LEVEL_AT = 4, NO_LEVEL = 1 << LEVEL_AT };
@@ -31,7 +28,6 @@ enum { ENTERS = 1, EXCHANGES = 2, REWARD_AT = 2 };
 #define LEVEL(level) (((level) + 1) * NO_LEVEL)
 
 /* A set of actions is a list: from the lowest bit, three bits for its length and for each action. */
-#define ONLY(action) (1 | (action) << 3)
 enum { ALL_ACTIONS = N_ACTIONS | FORWARD << 6 | RIGHT << 9 | PICK_UP << 12 | GIVE << 15 };
 
 /* A state's action values, the largest of them, and the list of actions that have it. */
@@ -195,14 +191,10 @@ INLINE void note_best(const Shared *shared, Row *row)
 INLINE int choose(const Row *row, Ant *ant)
 {
     uint64_t bits = draw(&ant->random);
-    if (TOGETHER == 1 && bits >> 32 >= ant->explore_below) {
-        if (row->choices == ONLY(FORWARD))
-            return FORWARD;
-        if (row->choices == ONLY(LEFT))
-            return LEFT;
-        if (row->choices == ONLY(RIGHT))
-            return RIGHT;
-    }
+    if (TOGETHER == 1 && bits >> 32 >= ant->explore_below) /* one ant's moves are predicted */
+        for (int move = LEFT; move <= RIGHT; move++)
+            if (row->choices == (1 | (uint32_t)move << 3))
+                return move;
     /* All bits are set if the ant explores: a difference that is negative, shifted. */
     uint32_t explores = (uint32_t)((int64_t)((bits >> 32) - ant->explore_below) >> 63);
     uint32_t choices = row->choices ^ ((row->choices ^ ALL_ACTIONS) & explores);

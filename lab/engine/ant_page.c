@@ -16,6 +16,7 @@ static int n_notes, most_notes;
     notes[n_notes++] = (Note){(ant)->episode, (ant)->step, (ant)->state, (ant)->taken,           \
                               (ant)->reward, (ant)->next, (ends), (ant)->cell, (ant)->heading,   \
                               (entry)}
+#define TOGETHER 4
 #include "ant.c"
 #include "grid.h"
 
