@@ -28,6 +28,7 @@ COLONY = "tests/engines/colony/test_against_reference.py"
 RASTER = "tests/rendering/test_raster.py"
 CASTES = "tests/engines/colony/test_castes.py"
 ENGINE = "tests/engines/colony/test_engine.py"
+SCHEDULES = "tests/engines/colony/test_schedules.py"
 BY_ANT = "tests/engines/colony/test_by_ant.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
@@ -135,11 +136,12 @@ MUTATIONS = [
     ("task/rules/pheromone.py", "ti.min(carried, p.fades_after)", "carried", ENGINE),
     ("task/rules/pheromone.py", "if after < 1.0:", "if after < 0.5:", COLONY),
     ("task/rules/pheromone.py", "levels[neighbour] * share", "level * share", COLONY),
+    ("task/rules/policy.py", "if values[FORWARD] > larger", "if values[FORWARD] >= larger", RUNS),
     ("task/rules/policy.py", "larger(values[2], values[3])", "values[2]", RUNS),
     (
         "task/rules/policy.py",
-        "action = below(low_word(bits), N_ACTIONS)\n    else:\n        mask = best_actions",
-        "action = below(high_word(bits), N_ACTIONS)\n    else:\n        mask = best_actions",
+        "(low_word(bits), N_ACTIONS)\n    if high_word(bits) >= explore_below:\n        others",
+        "(high_word(bits), N_ACTIONS)\n    if high_word(bits) >= explore_below:\n        others",
         RUNS,
     ),
     (
@@ -263,6 +265,10 @@ MUTATIONS = [
     ("engines/colony/interventions.py", "nest)) + 0.5)", "nest)))", PROTOCOL),
     ("engines/colony/interventions.py", "max(episode, 0))", "0)", PROTOCOL),
     ("engines/colony/stepping.py", "if stale.any():", "if False:", PROTOCOL),
+    ("engines/colony/stepping.py", "median(self.recent) / self", "recent[-1] / self", SCHEDULES),
+    ("engines/colony/stepping.py", "if counts else pace", "if False else pace", SCHEDULES),
+    ("engines/colony/kernels.py", "done * blocks)", "done)", BY_ANT),
+    ("engines/colony/kernels.py", "done += 1", "done += of != WORLD", BY_ANT),
     ("protocol.py", "range(self.interval, length", "range(0, length", PROTOCOL),
     ("protocol.py", "value > self.above", "value >= self.above", PROTOCOL),
     # Learners.
@@ -304,7 +310,7 @@ MUTATIONS = [
     ("files/__init__.py", 'with open(temporary, "wb")', 'with open(target, "wb")', FILES),
     ("files/__init__.py", "None if v != v else v", "v", FILES),
     ("studies/store.py", "if set(arrays.files) != {_ABOUT, *every}:", "if False:", STUDIES),
-    ("studies/store.py", "if all(parts_of(name, block", "if any(parts_of(name, block", STUDIES),
+    ("studies/store.py", "if all(parts_of(name, b.", "if any(parts_of(name, b.", STUDIES),
     ("studies/store.py", "np.nan if array.dtype.kind", "0 if array.dtype.kind", STUDIES),
     ("studies/study.py", "(indices, -(-len(indices) // most))", "(indices, 1)", STUDIES),
     ("studies/study.py", "- work / 2", "", STUDIES),

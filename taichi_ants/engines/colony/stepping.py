@@ -49,12 +49,11 @@ class ThreadChoice:
         self.at = len(self.numbers) - 1  # the place of the present number
         self.gains: dict[int, float] = {}  # by place: log of the speed relative to the present one
         self.tried: dict[int, float] = {}  # by place: seconds per tick in the last trial
-        self.recent: list[float] = []  # seconds per tick of the last launches between trials
+        self.recent: list[float] = []  # seconds per tick of the last launches of no trial
         self.allowance = 0.0  # seconds that trials may take by now
         self._step = 1  # to the neighbour that was tried last, then the other one
         self._left = 0  # launches of a trial that are left
         self._ticks = 1  # in each of them
-        self._rested = False  # whether a trial has just ended
 
     def plan(self, ticks: int, most: int) -> tuple[int, int]:
         """Return the number of ticks for the next launch, and of threads, up to `most`."""
@@ -78,16 +77,13 @@ class ThreadChoice:
         pace, other = seconds / ticks, self.at + self._step
         self.allowance += _TRIAL_SHARE * seconds
         if not self._left:
-            if not self._rested:
-                self.recent = [*self.recent[-4:], pace]
-            self._rested = False
+            self.recent = [*self.recent[-4:], pace]
             return
         self.allowance -= seconds if other in self.tried else 0.0
         counts = self._left < _TRIAL_LAUNCHES - 1  # the first two give a pace to compare with
         self.tried[other] = min(pace, self.tried[other]) if counts else pace
         self._left -= 1
-        self._rested = not self._left
-        if self._rested:
+        if not self._left:
             gain = math.log(statistics.median(self.recent) / self.tried[other])
             self.gains[other] = gain + self.gains.get(other, 0.0) / 2
             if self.gains[other] > _LEAST_GAIN:
