@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from measuring import Work, a_ratio, machine, pace, show
-from throughput import compile_c, compiler, compiler_note
+from throughput import checked_compiler, compile_c, compiler_note
 
 from taichi_ants import Task, TrainingConfig, runtime, worlds
 from taichi_ants.analysis.tables import Table, figure, interval, thousands
@@ -195,8 +195,7 @@ def compare(
         AntsError: A ratio is below `least`, or results differ.
     """
     threads = runtime.start(threads).threads
-    if (command := compiler(threads)) is None:
-        print("There is no C compiler (CC, clang, gcc or cc), so the comparison is skipped.")
+    if (command := checked_compiler(threads, publishes)) is None:
         return
     with tempfile.TemporaryDirectory() as folder:
         found = measured(load(command, folder, threads), ants, rounds, threads, _SECONDS)

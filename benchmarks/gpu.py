@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 
 import numpy as np
 from cores import COLONIES, Q_LEARNING, colony_of
@@ -181,14 +181,20 @@ def comparisons(seconds: float, on_cpu: bool, word: str) -> Iterator[list[str]]:
     """Yield the name of each case that contains a word, and its result, when it has ended."""
     expected = environments() if word in "environments" else ""
     chosen = [case for case in cases(expected) if word in case]
-    workers = min(runtime.available_threads(), len(chosen)) or 1
+    if not chosen:
+        raise AntsError(f"--only is {word!r}; choose a word such as training, colony or life.")
+    workers = min(runtime.available_threads(), len(chosen))
     end = time.perf_counter() + seconds
     with ProcessPoolExecutor(workers, get_context("spawn"), start, (on_cpu,)) as pool:
         results = {case: pool.submit(compared, case, expected) for case in chosen}
-        for case, result in results.items():
-            done, _ = wait([result], max(0.0, end - time.perf_counter()))
-            yield [case, result.result() if done else "left out"]
-        pool.shutdown(wait=False, cancel_futures=True)
+        try:
+            for case, result in results.items():
+                done, _ = wait([result], max(0.0, end - time.perf_counter()))
+                yield [case, result.result() if done else "left out"]
+        finally:  # also after Ctrl-C; what is left out would disturb the speeds
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in active_children():
+                worker.terminate()
 
 
 def speeds(bandwidth: float) -> Iterator[list[str]]:
@@ -248,6 +254,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     def command() -> None:
         given = parser.parse_args(arguments)
+        if given.publish and (given.on_cpu or given.only):
+            raise AntsError("--publish needs all results of a GPU; leave out --on-cpu and --only.")
         if not given.on_cpu:
             card()
         tables = measured(given.seconds, given.on_cpu, given.only)

@@ -97,14 +97,26 @@ Yardstick = Callable[[Any, Any, Any], int]  # a function of C
 def compiler(threads: int) -> str | None:
     """Return the C compiler of this machine: CC, or else the first of clang, gcc and cc.
 
-    For several threads, it is the first that has OpenMP, if there is one. CC is not checked. None
-    if there is no compiler.
+    For several threads, it is the first that has OpenMP, if there is one. None if there is no
+    compiler. AntsError if CC is not a program; else it is not checked.
     """
-    if own := shutil.which(os.environ.get("CC", "")):
-        return own
+    if chosen := os.environ.get("CC"):
+        if own := shutil.which(chosen):
+            return own
+        raise AntsError(f"CC is {chosen!r}; it must be the name or path of a compiler, or unset.")
     found = [one for name in ("clang", "gcc", "cc") if (one := shutil.which(name))]
     usable = (one for one in found if threads == 1 or _has_openmp(one))
     return next(usable, found[0] if found else None)
+
+
+def checked_compiler(threads: int, publishes: bool) -> str | None:
+    """Return the C compiler. Without one, print that there is none; AntsError to publish."""
+    command = compiler(threads)
+    if command is None and publishes:
+        raise AntsError("--publish requires a C compiler, CC, clang, gcc or cc; install one.")
+    if command is None:
+        print("There is no C compiler (CC, clang, gcc or cc), so the comparison is skipped.")
+    return command
 
 
 def _has_openmp(command: str) -> bool:
@@ -291,15 +303,14 @@ def compare(seeds: int, rounds: int, threads: int, least: float, publishes: bool
         AntsError: Training of a learner is slower than `least` times ant.c, or results differ.
     """
     threads = runtime.start(threads).threads
+    command = checked_compiler(threads, publishes)
     with tempfile.TemporaryDirectory() as folder:
-        command = compiler(threads)
         yardsticks = load_yardsticks(command, folder, threads) if command else {}
         steps, seconds = measured(yardsticks, range(seeds), rounds, threads)
     compiled = [compiler_note(command, threads)] if command else []
     made = table(list(yardsticks), steps, seconds, seeds, threads, compiled)
     show("performance_training", [made], publishes)
     if not yardsticks:
-        print("There is no C compiler (CC, clang, gcc or cc), so the comparison is skipped.")
         return
     ratios = {name: float(np.median(one[:, 1] / one[:, 0])) for name, one in seconds.items()}
     worst = min(ratios, key=ratios.__getitem__)

@@ -57,9 +57,9 @@ def write(path: Path, tables: Sequence[Table]) -> None:
 
 
 def fill() -> None:
-    """Write the published tables and numbers into all pages."""
-    for page in pages():
-        write_text(page, filled(read_text(page)))
+    """Write the published tables and numbers into all pages, or into none if one is unclear."""
+    for page, text in [(page, filled(read_text(page))) for page in pages()]:
+        write_text(page, text)
 
 
 def show(name: str, tables: Sequence[Table], publishes: bool, figure: Path | None = None) -> None:
@@ -104,7 +104,10 @@ def cell(place: str) -> str:
         if all(part in cells for part in row)
     ]
     if len(found) != 1:
-        raise AntsError(f"{len(found)} cells are at {place!r}; name the cells of one row.")
+        raise AntsError(
+            f"a page quotes {place!r}, but {len(found)} cells are there; change the page and run "
+            "experiments/published.py, or restore docs/results/data with git."
+        )
     text = " ".join(found[0].split())
     return text if place.endswith("!") else re.split(r" [\[(]", text)[0]
 

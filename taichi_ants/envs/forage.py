@@ -19,7 +19,7 @@ from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs import vector
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.vector import Ants, AntVectorEnv, Arguments, Place, RenderMode, Rules, Worlds
-from taichi_ants.errors import check_one_of, checked_whole, shown, whole
+from taichi_ants.errors import check_one_of, checked_whole, enough_memory, shown, whole
 from taichi_ants.features.support import CHOICE, LONE
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
@@ -215,8 +215,8 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         if batched.alone[2] >= TRUNCATED:  # the result; also before the first episode
             ants.check_begun("step()")
             raise ResetNeeded("the episode has ended; call reset() before step().")
-        known = type(action) in _WHOLE and 0 <= action < N_ACTIONS
-        if not known and not self.action_space.contains(action):  # which takes a microsecond
+        quick = type(action) in _WHOLE  # `contains` takes a microsecond, and no large numbers
+        if not (0 <= action < N_ACTIONS if quick else self.action_space.contains(action)):
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
         results = batched.step_alone(action)
         outcome = ants.outcomes.get(results) or ants.outcome(results)
@@ -351,6 +351,7 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         ants = LoneAnts(n, delivery, arguments)
         super().__init__(ants, n, autoreset_mode)
 
+    @enough_memory("so many steps or environments")
     def rollout(
         self,
         policy: Any,

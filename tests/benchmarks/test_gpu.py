@@ -50,3 +50,5 @@ def test_without_a_gpu_it_says_so(monkeypatch, capsys):
     run(status=2)
     told = "error: no CUDA device is usable here; --on-cpu compares results without one.\n"
     assert capsys.readouterr().err == told
+    run("--on-cpu", "--publish", status=2)
+    assert "leave out --on-cpu" in capsys.readouterr().err

@@ -170,7 +170,7 @@ def test_wrong_steps_raise_what_gymnasium_raises():
         with pytest.raises(ResetNeeded, match="reset"):
             env.step(good)
         env.reset(seed=0)
-        for wrong in (5, -1, 1.0, "left", None, [0, 5], [0, 0, 0], np.array([0.0, 1.0])):
+        for wrong in (5, -1, 2**63, 1.0, "left", None, [0, 5], [0] * 3, np.array([0.0, 1.0])):
             with pytest.raises(InvalidAction, match="must be"):
                 env.step(wrong)
     env = HexForageEnv(max_steps=1)

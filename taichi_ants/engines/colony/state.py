@@ -351,7 +351,7 @@ class ColonyState:
         if not self.ready.all():
             why = "no episode has begun"
             if self.episode >= 0:
-                why = "not all worlds have begun an episode, or an intervention was interrupted"
+                why = "not all worlds have begun an episode, or a change of one was interrupted"
             raise AntsError(f"{why}; call begin_episode first.")
 
     def _check_finite(self) -> None:
