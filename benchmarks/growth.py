@@ -268,7 +268,7 @@ def draw(found: Paces) -> None:
         caption = "Medians, with the lowest and highest. Runs learn by Q-learning, ants by SARSA."
         title = "Throughput by the number of runs, ants, cells and states"
         style.frame(drawn, title, caption, style.legend_entries(panels))
-    style.save_all({"growth": drawn}, FIGURES)
+    style.save(drawn, FIGURES / "growth.png")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

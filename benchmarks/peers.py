@@ -201,7 +201,7 @@ def draw(found: dict[str, Paces]) -> None:
         title = "Steps per second on one machine"
         caption = "Medians, with the lowest and highest. Compare within a panel."
         style.frame(drawn, title, caption, style.legend_entries(panels))
-    style.save_all({"peers": drawn}, FIGURES)
+    style.save(drawn, FIGURES / "peers.png")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
