@@ -63,7 +63,7 @@ class ThreadChoice:
             pace = statistics.median(self.recent)
             self._ticks = max(1, round(_TRIAL_SECONDS / pace))
             for step in (-self._step, self._step):
-                slower = self.tried.get(self.at + step, pace / 4) / pace
+                slower = self.tried.get(self.at + step, pace / 3) / pace
                 cost = _TRIAL_LAUNCHES * min(ticks, self._ticks) * pace * slower**2
                 if 0 <= self.at + step < len(self.numbers) and cost <= self.allowance:
                     self._left, self._step = _TRIAL_LAUNCHES, step
