@@ -44,7 +44,7 @@ if platform.machine() == "x86_64" and platform.libc_ver()[0] == "glibc":
 # that tests can compare the two on machines without one.
 gpu_kernels_on_cpu = False
 
-# A lock for environments in several threads, because Taichi compiles and launches for one thread.
+# A lock for several threads, because Taichi starts, compiles and launches for one thread.
 alone = threading.RLock()
 
 
@@ -96,30 +96,32 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
         checked_whole("threads", threads, 1, MAX_THREADS)
     import taichi as ti
 
-    running = _running(ti)
-    if running is None:
-        wanted = Runtime(arch or "cpu", threads or available_threads())
-    else:
-        wanted = Runtime(arch or running.arch, threads or running.threads)
-    if wanted == running:
-        return wanted
-    if running is not None:
-        ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
-        # Those of the user's program, and of colonies and environments on a GPU.
-        data = ti.Field, ti.Ndarray, ti.Texture
-        has_data = _exists(data)
-        if has_data:
-            gc.collect()  # Taichi keeps arrays that kernels were compiled for in cycles
+    with alone:
+        running = _running(ti)
+        if running is None:
+            wanted = Runtime(arch or "cpu", threads or available_threads())
+        else:
+            wanted = Runtime(arch or running.arch, threads or running.threads)
+        if wanted == running:
+            return wanted
+        if running is not None:
+            ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
+            # Those of the user's program, and of colonies and environments on a GPU.
+            data = ti.Field, ti.Ndarray, ti.Texture
             has_data = _exists(data)
-        if not ours or has_data:
-            why = "has fields or arrays" if ours else "was not started by taichi_ants"
-            raise AntsError(
-                f"arch={wanted.arch!r}, threads={wanted.threads} requires a restart of Taichi, but "
-                f"it runs with {running.arch!r}, {running.threads} threads, and {why}; leave out "
-                "threads and arch, or call ti.reset() first, which destroys all fields and arrays."
-            )
-    _init(ti, wanted)
-    return wanted
+            if has_data:
+                gc.collect()  # Taichi keeps arrays that kernels were compiled for in cycles
+                has_data = _exists(data)
+            if not ours or has_data:
+                why = "has fields or arrays" if ours else "was not started by taichi_ants"
+                raise AntsError(
+                    f"arch={wanted.arch!r}, threads={wanted.threads} requires a restart of Taichi, "
+                    f"but it runs with {running.arch!r}, {running.threads} threads, and {why}; "
+                    "leave out threads and arch, or call ti.reset() first, which destroys all "
+                    "fields and arrays."
+                )
+        _init(ti, wanted)
+        return wanted
 
 
 def stop() -> None:
@@ -286,6 +288,7 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
         finally:
             os.environ.update(hidden)
     ti.lang.impl.get_runtime().is_ours = True
+    ti.lang.impl.get_runtime().materialize()  # other threads may not
     if wanted.arch == "cuda" and ti.lang.impl.current_cfg().arch != ti.cuda:
         ti.reset()
         raise AntsError("arch is 'cuda', but no CUDA device is usable here; choose 'cpu'.")

@@ -69,6 +69,16 @@ assert runtime.start() == runtime.Runtime("cpu", runtime.available_threads())
     assert list((tmp_path / "kernels" / "taichi_ants" / "kernels").iterdir())
 
 
+def test_several_threads_start_it_at_once(tmp_path):
+    script = """
+from concurrent.futures import ThreadPoolExecutor
+with ThreadPoolExecutor(4) as pool:
+    made = [pool.submit(trained) for _ in range(4)]
+assert all((one.result().q_values == trained().q_values).all() for one in made)
+"""
+    python(BEGINNING + script, tmp_path)
+
+
 def test_beside_a_taichi_of_the_callers(tmp_path):
     """It is used as it is, and refused if it would change results."""
     script = """

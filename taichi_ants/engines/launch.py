@@ -58,9 +58,10 @@ class Launch:
     def __call__(self, values: Mapping[str, Any]) -> None:
         """Launch with these values; names and types are always the same, arrays C-contiguous."""
         if self._taichi() is not impl.get_runtime():
-            runtime.start()  # the caller may have reset Taichi
-            check_not_lost(values.values())
-            self._prepare(values)
+            with runtime.alone:
+                runtime.start()  # the caller may have reset Taichi
+                check_not_lost(values.values())
+                self._prepare(values)
         for name, value in values.items():
             if self._known[name] is not value:
                 self._set(name, value)
