@@ -64,7 +64,9 @@ class ThreadChoice:
             self._ticks = max(1, round(_TRIAL_SECONDS / pace))
             for step in (-self._step, self._step):
                 slower = self.tried.get(self.at + step, pace / 3) / pace
-                cost = _TRIAL_LAUNCHES * min(ticks, self._ticks) * pace * slower**2
+                # More threads are often slow for a short time only, for example two on a processor.
+                weight = slower**2 if step < 0 else min(slower, 2)
+                cost = _TRIAL_LAUNCHES * min(ticks, self._ticks) * pace * weight
                 if 0 <= self.at + step < len(self.numbers) and cost <= self.allowance:
                     self._left, self._step = _TRIAL_LAUNCHES, step
                     break
@@ -77,7 +79,7 @@ class ThreadChoice:
         pace, other = seconds / ticks, self.at + self._step
         self.allowance += _TRIAL_SHARE * seconds
         if not self._left:
-            self.recent = [*self.recent[-4:], pace]
+            self.recent = [*self.recent[-8:], pace]
             return
         self.allowance -= seconds if other in self.tried else 0.0
         counts = self._left < _TRIAL_LAUNCHES - 1  # the first two give a pace to compare with
@@ -88,6 +90,7 @@ class ThreadChoice:
             self.gains[other] = gain + self.gains.get(other, 0.0) / 2
             if self.gains[other] > _LEAST_GAIN:
                 self.at, self.gains, self.recent = other, {}, [self.tried[other]]
+                self.allowance = 0.0  # a trial that leads to a change is no loss
 
 
 class TickingColony(ColonyState):
