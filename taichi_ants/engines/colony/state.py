@@ -278,12 +278,16 @@ class ColonyState:
         return rewards
 
     def outcome(self) -> ColonyEpisodes:
-        """Return the results of the episode so far, arrays (1, W); AntsError if a value is NaN.
+        """Return the results of the episode so far, arrays (1, W).
+
+        Raises:
+            AntsError: An episode has not begun, or was interrupted, or a value is NaN.
 
         >>> colony.tick(100)
         >>> colony.outcome().ticks.item()
         100
         """
+        self._check_begun()
         self._check_finite()
         return self._results()
 

@@ -147,7 +147,7 @@ def test_a_tick_that_was_interrupted_ends_the_episode():
     colony.tick(2)
     with interrupted_after_launch(2):
         colony.tick(40)
-    for use in (colony.tick, colony.snapshot):
+    for use in (colony.tick, colony.snapshot, colony.outcome):
         with pytest.raises(AntsError, match=r"interrupted; call begin_episode first\.$"):
             use()
     colony.begin_episode()
