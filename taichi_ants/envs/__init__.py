@@ -14,8 +14,7 @@ register(
     "taichi_ants/HexForage-v0",
     entry_point="taichi_ants.envs.forage:HexForageEnv",
     vector_entry_point="taichi_ants.envs.forage:HexForageVectorEnv",
-    # Without Gymnasium's wrappers: the environment checks the order of calls itself.
-    order_enforce=False,
+    order_enforce=False,  # instead of Gymnasium's wrappers, the environment checks its calls
     disable_env_checker=True,
 )
 register(
