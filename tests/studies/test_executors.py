@@ -123,29 +123,33 @@ def test_the_calls_of_a_dead_worker_are_lost_and_no_others(tmp_path):
         time.sleep(0.05)
 
 
-ONE_WORKER = """
+ONE_KERNEL = """
+import sys
 import numpy as np
-from taichi_ants import runtime
 from taichi_ants.rendering.rasteriser import draw_marks, marks
+from taichi_ants.studies.command_line import run_command
 from taichi_ants.studies.executors import Workers
 
-with Workers(1) as workers:
-    frame, mark = np.zeros((9, 9, 3), np.uint8), marks((4, 4), 3, 0, 0)
-    workers.submit(draw_marks, frame, mark).result()
-print(len([*runtime.cache_folder().glob("*.tic")]))
+frame, mark = np.zeros((9, 9, 3), np.uint8), marks((4, 4), 3, 0, 0)
+if sys.argv[1] == "worker":
+    with Workers(1) as workers:
+        workers.submit(draw_marks, frame, mark).result()
+else:
+    run_command(lambda: draw_marks(frame, mark))
 """
 
 
-@pytest.mark.parametrize("threads", ["1", "2"])  # with one, the worker is a fork on Linux
-def test_a_worker_saves_its_kernels(threads, tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-c", ONE_WORKER],
+@pytest.mark.parametrize(
+    ("process", "threads"),
+    [("worker", "1"), ("worker", "2"), ("command", "2")],  # with one, it is a fork on Linux
+)
+def test_a_process_saves_its_kernels(process, threads, tmp_path):
+    subprocess.run(
+        [sys.executable, "-c", ONE_KERNEL, process],
         env=environment(tmp_path, OPENBLAS_NUM_THREADS=threads),
-        capture_output=True,
-        text=True,
         check=True,
     )
-    assert done.stdout == "1\n"
+    assert len([*tmp_path.rglob("*.tic")]) == 1
 
 
 def test_workers_can_be_threads_of_this_process(tmp_path, monkeypatch):
