@@ -4,6 +4,7 @@ Importing the package does not start Taichi; the first call that needs a kernel 
 """
 
 import ast
+import atexit
 import contextlib
 import ctypes
 import gc
@@ -288,6 +289,7 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
         finally:
             os.environ.update(hidden)
     ti.lang.impl.get_runtime().is_ours = True
+    atexit.register(stop)  # which saves kernels; otherwise, a collection of garbage would do so
     ti.lang.impl.get_runtime().materialize()  # other threads may not
     if wanted.arch == "cuda" and ti.lang.impl.current_cfg().arch != ti.cuda:
         ti.reset()

@@ -220,7 +220,7 @@ def reporting(interrupted: str = "Stopped.") -> Iterator[None]:
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
     os.environ["MPLBACKEND"] = "agg"  # figures are files, and the user's backend may be missing
-    atexit.register(_end)
+    atexit.register(gc.freeze)  # so that Python ends without collections, which take 0.2 s
     status = 0
     try:
         with stoppable(interrupted):
@@ -234,13 +234,6 @@ def reporting(interrupted: str = "Stopped.") -> Iterator[None]:
         notice(f"error: {words_of(error).rstrip('.')}.")
         status = getattr(error, "exit_status", EXIT_BAD_INPUT)
     sys.exit(status)
-
-
-def _end() -> None:
-    """Save the kernels, and let Python end without collections of garbage, which take 0.2 s."""
-    if runtime := sys.modules.get("taichi_ants.runtime"):
-        runtime.stop()
-    gc.freeze()
 
 
 def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> None:
