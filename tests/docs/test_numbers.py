@@ -52,7 +52,7 @@ def test_a_number_is_that_of_its_cell(tmp_path, monkeypatch):
     assert new.startswith("before\n<!-- made -->\n\n|")
     assert published.filled(new) == new
     for place in ("made; a; mean of all", "made; b; mean of all", "made; x; median"):
-        with pytest.raises(AntsError, match="a page quotes .* cells are there"):
+        with pytest.raises(AntsError, match=r"a page quotes .* cells are there"):
             published.cell(place)
 
 
