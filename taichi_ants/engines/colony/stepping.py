@@ -90,7 +90,7 @@ class ThreadChoice:
             self.gains[other] = gain + self.gains.get(other, 0.0) / 2
             if self.gains[other] > _LEAST_GAIN:
                 self.at, self.gains, self.recent = other, {}, [self.tried[other]]
-                self.allowance = 0.0  # a trial that leads to a change is no loss
+                self.allowance = 0.0  # a trial that paid off has cost nothing
 
 
 class TickingColony(ColonyState):

@@ -67,7 +67,7 @@ def choose(values, bits, explore_below):
     """Return an epsilon-greedy action from one draw; `explore_below` is epsilon * 2**32, u64.
 
     Each move that can be the best one has its own branch, here and in `choose_from_masks`: the
-    processor goes on with the action that it predicts, and finds out early if that is wrong.
+    processor goes on with the action that it predicts, and soon notices a wrong prediction.
     """
     action = below(low_word(bits), N_ACTIONS)
     if high_word(bits) >= explore_below:
